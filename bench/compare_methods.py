@@ -115,10 +115,10 @@ def chosen(task: Task, candidates: list[Fit]) -> tuple[Predict, int, str]:
     for d in task.decimation:
         data = Decimated.of(task, task.train, d)
         split = int(0.75 * len(data.y))
-        fit, held = data.cut(0, split), data.cut(split, len(data.y))
+        fit, rest = data.cut(0, split), data.cut(split, len(data.y))
         for candidate in candidates:
             box = candidate(fit)
-            error = held.y[box.lag :] - safe(box, held)[box.lag :]
+            error = rest.y[box.lag :] - safe(box, rest)[box.lag :]
             with np.errstate(over="ignore", invalid="ignore"):
                 found.append((float(np.sqrt(np.mean(error**2))), candidate, d))
     _, best, d = min(found, key=lambda entry: entry[0] if np.isfinite(entry[0]) else np.inf)

@@ -24,7 +24,7 @@ class Task:
     """Fit on `train`, simulate `test` freely from its input alone.
 
     controller: of the loop that the command went through, None where the torque is the input; `unit` of the error, and the factor
-    that brings rad/s or m/s to it. continued: `test` holds `train` at its beginning; only its samples from `first` on count.
+    that brings rad/s or m/s to it. continued: `test` contains `train` at its beginning; only its samples from `first` on count.
     decimation: what black boxes may thin the samples by: one-step prediction of a finely sampled signal teaches them nothing.
     published: (method, figure) as reported elsewhere, copied facts; `note` says what they are.
     """

@@ -6,8 +6,8 @@
 
 NAME is a row of `gaident.policy.table` that decides, or the kind of cases by which rows are shown: "drives" measures every row
 that they show, "all" every row. `--kind` runs other cases than those that a row names.
-`--cases` is the count of each combination; which cases a kind holds says bench/rows/cases.py.
-`--only` keeps those whose key holds one of some texts: where a case takes minutes, fewer of them.
+`--cases` is the count of each combination; which cases a kind contains says bench/rows/cases.py.
+`--only` keeps those whose key contains one of some texts: where a case takes minutes, fewer of them.
 Every finished case is a line of the file: stop at will, start again and it goes on.
 `--write` puts what was measured into the data of docs/theory/policy.md (bench/rows/measured.json); `python docs/tools/policy.py`
 writes the page then.
@@ -117,7 +117,7 @@ def options_of(arguments: list[str] | None = None) -> argparse.Namespace:
     parser.add_argument("--workers", type=int, default=1)
     parser.add_argument("--seed", type=int, default=5)
     parser.add_argument("--kind", choices=SHOWN_BY, help="other cases than those that the row names")
-    parser.add_argument("--only", nargs="+", default=[""], metavar="TEXT", help="cases whose key holds one of these texts")
+    parser.add_argument("--only", nargs="+", default=[""], metavar="TEXT", help="cases whose key contains one of these texts")
     which = parser.add_mutually_exclusive_group()
     which.add_argument("--ranges", action="store_true", help="only the watched run: in which range no decision changes")
     which.add_argument("--report", action="store_true", help="run nothing: from what is there")

@@ -58,7 +58,7 @@ THREADS: list[Row] = [
 
 
 def peak() -> float:
-    """Most memory this process ever held, MiB."""
+    """Most memory this process ever used, MiB."""
     try:
         with open("/proc/self/status") as status:
             return next(float(line.split()[1]) for line in status if line.startswith("VmHWM")) / 1024.0

@@ -38,7 +38,7 @@ def judge(drive: Drive, what: dict[str, Any]) -> dict[str, Any]:
 
     right    every group of the truth is named, and nothing false is found
     in set   every group of the truth is in the set of a finding, and nothing false is found
-    wrong    a finding holds nothing of the truth nor of what is allowed, or one name where the record decides nothing
+    wrong    a finding contains nothing of the truth nor of what is allowed, or one name where the record decides nothing
     missed   else: a group of the truth is in no finding
     "wrong" outweighs "missed"; `missed` and `false` say both.
     """

@@ -120,8 +120,8 @@ def actuator(motor: int, run: int) -> tuple[list[ga.Record], list[ga.Record]]:
 
     dt = round(float(np.median(np.diff(log["time"]))), 4)
     channels = {"command": "velocity_cmd", "velocity": "velocity", "torque": "torque_feedback", "position": "position"}
-    held = resampled("log", {name: (log["time"], log[column]) for name, column in channels.items()}, dt)
-    return [ga.Record(dt, **held, torque_is="measured", name=f"motor {motor}, run {run}")], []
+    logged = resampled("log", {name: (log["time"], log[column]) for name, column in channels.items()}, dt)
+    return [ga.Record(dt, **logged, torque_is="measured", name=f"motor {motor}, run {run}")], []
 
 
 def _cell(text: str) -> float:

@@ -1,4 +1,4 @@
-"""The cases that show a row of the policy: what each kind of them holds, how one is run, and what its result is called.
+"""The cases that show a row of the policy: what each kind of them contains, how one is run, and what its result is called.
 
     drives      simulated drives of the blind bench, of each number five: one that hides nothing, one effect at its typical size,
                 one at 0.1 to 4 times of it, two effects, one that the library does not know

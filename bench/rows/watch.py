@@ -1,6 +1,6 @@
 """Watched numbers: one run of a case shows for every row of the policy how far it can be moved before any decision changes.
 
-A watched policy holds, instead of each number that decides, a `Watched`: the number, and beside it what it would be if its row
+A watched policy contains, instead of each number that decides, a `Watched`: the number, and beside it what it would be if its row
 were moved by each of some steps. Arithmetic and NumPy's functions carry all of them along. Where a comparison, a rounding or
 another conversion ends in a plain value, the run goes on with the value of the policy, and every step for which the plain value
 would be another is noted in `Watch.turned`.

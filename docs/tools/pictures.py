@@ -213,7 +213,7 @@ def draw(name: str, picture: Picture) -> Figure:
 
 
 def outliers() -> Figure:
-    """Not simulated: a record that holds some."""
+    """Not simulated: a record that contains some."""
     plain = run_of(ONE.model(), STEPS)
     rng = np.random.default_rng(0)
     seen = plain.seen + 0.3 * rng.standard_normal(plain.seen.size)

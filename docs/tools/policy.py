@@ -76,7 +76,7 @@ What was measured is the third column: at that value none of the {records} recor
 
 The test is a variance ratio: the rms of errors over the noise sigma that the measured velocity itself shows, against the level
 that records without effects pass (`estimation/criterion.py`).
-It is asked of two errors, because they hold different things.
+It is asked of two errors, because they contain different things.
 
 - `noise_ratio`, of whitened errors: what a model leaves that its own past does not foretell. It decides whether a model is
   adequate, and, of the linear model, whether output errors are searched first.
@@ -123,7 +123,7 @@ CHANGES = """\
 runs cases with the number as it is, at half and at twice.
 Of a share between one half and 1, what is missing to 1 is doubled and halved; a probability is moved by ten.
 Its row says which cases show it: {cases}.
-What each kind holds stands in `bench/rows/cases.py`.
+What each kind contains stands in `bench/rows/cases.py`.
 
 A case runs once while every number is watched: it is carried through the arithmetic together with what it would be if it were
 moved, and where a comparison or a rounding would come out otherwise, that is noted.

@@ -81,7 +81,7 @@ def page(text: str, name: str) -> None:
     """Runs the Python of a page of docs/ in the current folder."""
     blocks = [block for block in BLOCK.findall(text) if "ga.read(" not in block]
     if not blocks:
-        sys.exit(f"{name} holds no Python")
+        sys.exit(f"{name} contains no Python")
     names: dict[str, object] = {}
     for block in blocks:
         exec(compile(block, name, "exec"), names)

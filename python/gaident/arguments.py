@@ -26,7 +26,7 @@ class Argument:
         return f"{self.name}={{{self.key!r}: {self.value}}}" if self.key else f"{self.name}={self.value}"
 
 
-_START, _NEXT, _END = "\x02", "\x1f", "\x03"  # control characters, which no message holds otherwise
+_START, _NEXT, _END = "\x02", "\x1f", "\x03"  # control characters, which no message contains otherwise
 
 
 def arg(name: str, value: str = "", key: str = "", python: str = "") -> str:

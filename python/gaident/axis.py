@@ -214,10 +214,10 @@ def order(per_turn: float) -> Text:
 
 
 def linear_sentences(texts: Iterable[str]) -> dict[str, str]:
-    """Sentence -> the same on a linear axis, of those that differ: what a saved result holds beside its sentences."""
+    """Sentence -> the same on a linear axis, of those that differ: what a saved result contains beside its sentences."""
     return {str(t): t.linear for t in texts if isinstance(t, Text) and t.linear != t}
 
 
 def restored(text: str, linear: Mapping[str, str]) -> str:
-    """A saved sentence with what `linear_sentences` holds of it."""
+    """A saved sentence with what `linear_sentences` contains of it."""
     return Text(text, linear[text]) if text in linear else text

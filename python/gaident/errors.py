@@ -28,7 +28,7 @@ class GaidentError(ValueError):
     Parameters
     ----------
     message : object
-        The message; it may hold references to arguments, see gaident/arguments.py.
+        The message; it may contain references to arguments, see gaident/arguments.py.
 
     Attributes
     ----------

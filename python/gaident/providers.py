@@ -1,6 +1,6 @@
 """Methods of records, models and results whose work stands in a higher room.
 
-`model.to_c(...)`, `idn.plot()` and `dia.summary()` belong to the object that a user holds, but what they do is the work of rooms
+`model.to_c(...)`, `idn.plot()` and `dia.summary()` belong to the object that a user has, but what they do is the work of rooms
 that stand above it: export, text, pictures, the report.
 A lower room imports no higher one.
 It asks for the function by its name here, `provided("write_c")`, and the composition root, gaident/__init__.py, says in one

@@ -1,4 +1,4 @@
-// What an effect is. Its header holds everything about it:
+// What an effect is. Its header contains everything about it:
 //
 //     static constexpr EffectInfo info           its row in the table: name, place, meaning, parameters with units and ranges
 //     static constexpr Hooks hooks               which of the functions with a dash below it has

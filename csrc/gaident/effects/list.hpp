@@ -63,7 +63,7 @@ using Effects = EffectList<CoulombFriction,        //
                            ExtraResonance,         //
                            Outliers>;
 
-// Those of the shaft once more, at the load: a list of its own, so that a loop without them holds nothing of theirs.
+// Those of the shaft once more, at the load: a list of its own, so that a loop without them contains nothing of theirs.
 using LoadEffects = LoadSideOf<Effects>;
 // What models are made of, numbered in this order.
 using AllEffects = Joined<Effects, LoadEffects>;

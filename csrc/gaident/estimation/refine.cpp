@@ -36,7 +36,7 @@ public:
     }
 
 private:
-    std::vector<bool> held(const Vector& x, const Normal& m);
+    std::vector<bool> at_bound(const Vector& x, const Normal& m);
 
     const Experiment& experiment_;
     const RefineOptions& options_;
@@ -81,7 +81,7 @@ Normal Descent::normal(const Vector& x) {
 
 // A parameter at its bound with the descent direction pointing outward takes no part in a step: found by projecting a small step
 // along the negative gradient.
-std::vector<bool> Descent::held(const Vector& x, const Normal& m) {
+std::vector<bool> Descent::at_bound(const Vector& x, const Normal& m) {
     const std::size_t P = x.size();
     std::vector<bool> found(P, false);
     if (!options_.bounded) return found;
@@ -99,7 +99,7 @@ std::vector<bool> Descent::held(const Vector& x, const Normal& m) {
 
 void Descent::trials(const Vector& x, const Normal& m, double damping, Vector& trial) {
     const std::size_t P = x.size();
-    const std::vector<bool> fixed = held(x, m);
+    const std::vector<bool> fixed = at_bound(x, m);
     A_ = m.curvature;
     b_.resize(P);
     for (std::size_t j = 0; j < P; ++j) {

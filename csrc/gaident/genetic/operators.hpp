@@ -70,7 +70,7 @@ public:
     // Flips bits of [first, last) in each of `count` chromosomes of `words` words, one after the other.
     template <class Source>
     void apply(Source& random, Word* c, int words, std::size_t count, int first, int last) {
-        // 32 bits, which divide faster, hold every place in a population.
+        // 32 bits, which divide faster, contain every place in a population.
         const auto length = static_cast<std::uint32_t>(last - first);
         const std::uint64_t total = std::uint64_t{length} * count;
         std::uint64_t at = gap_;

@@ -142,7 +142,7 @@ void delay_torque(EffectModel& model, double delay) {
 }
 
 // These numbers decide how exact a simulation is, and how long it takes: against an integrator that shares no code they leave the
-// deviations of docs/effects.md, "How exact it is", which tests/python/models/test_effects.py holds them to.
+// deviations of docs/effects.md, "How exact it is", which tests/python/models/test_effects.py compares them with.
 int substeps_for(const EffectModel& model, const EffectRecord& record, const Loop& loop, bool own) {
     const Factors<double>& g = model.linear;
     const double Ts = record.sample_time;

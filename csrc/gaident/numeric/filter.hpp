@@ -74,7 +74,7 @@ void recursions(const double* a, double* v, std::size_t rows, std::size_t stride
     for (; r < rows; ++r) recursion<order, 1>(a, v + r * stride, stride, n);
 }
 
-// Rows of e to rows of v, `stride` apart, each row cut into records of these lengths. a holds at most 1 + max_recursion numbers.
+// Rows of e to rows of v, `stride` apart, each row cut into records of these lengths. a has at most 1 + max_recursion numbers.
 inline void filtered(std::span<const double> b, std::span<const double> a, const double* e, double* v, std::size_t rows,
                      std::size_t stride, std::span<const std::size_t> lengths) {
     using Run = void (*)(const double*, double*, std::size_t, std::size_t, std::size_t);

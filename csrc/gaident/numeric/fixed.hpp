@@ -9,7 +9,7 @@
 //
 // In a recurrence signals are summed in 64 bits with 16 more bits behind the point, products moved to that point rounded to
 // nearest; the word that is stored is rounded once.
-// What a word cannot hold takes its end, and whatever is computed from it says so: `saturated`.
+// What a word cannot represent takes its end, and whatever is computed from it says so: `saturated`.
 #pragma once
 
 #include "arithmetic.hpp"

@@ -1,5 +1,5 @@
 // A number as the unevaluated sum of two floats, hi + lo with |lo| at most half a last digit of hi: 48 bits from 32-bit
-// arithmetic, for what 24 bits cannot hold (delta.hpp: float_suffices).
+// arithmetic, for what 24 bits cannot represent (delta.hpp: float_suffices).
 // Sums and products without error after Knuth and Dekker (T. J. Dekker, A floating-point technique for extending the available
 // precision, Numer. Math. 18, 1971).
 #pragma once

@@ -63,7 +63,7 @@ private:
     std::uint64_t count_ = 0;
 };
 
-// The same words, made many at a time by `fill` (kernels/): several times faster where a register holds many.
+// The same words, made many at a time by `fill` (kernels/): several times faster where a register takes many.
 class WordStream {
 public:
     using Fill = void (*)(std::uint64_t base, std::uint64_t* out, std::size_t n);

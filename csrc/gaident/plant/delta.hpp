@@ -23,8 +23,8 @@ struct Delta {
     R b[room_for(N) + 1]{};
 };
 
-// Whether 24 bits hold the polynomial delta^N + a[0] delta^(N-1) + ...: rounding a[i] moves it, where |z| = 1 and so |delta| <=
-// 2, by up to 2^-24 |a[i]| |delta|^(N-1-i).
+// Whether 24 bits represent the polynomial delta^N + a[0] delta^(N-1) + ...: rounding a[i] moves it, where |z| = 1 and so
+// |delta| <= 2, by up to 2^-24 |a[i]| |delta|^(N-1-i).
 // The sum of these, relative to delta^N at its largest, is 2^-24 (k - 1) with
 //
 //     k = 1 + sum_i |a[i]| 2^-(i+1)        (1 with all poles at z = 1, 2^N with all at z = -1)

@@ -2,7 +2,7 @@
 //
 //     G(s) = K * prod_zeros (s + b) / prod_poles (s + a),      p poles more than zeros, q zeros
 //
-// gathered in second-order factors s^2 + e1 s + e0, which hold a conjugate pair and two real roots alike, and at most one
+// gathered in second-order factors s^2 + e1 s + e0, which contain a conjugate pair and two real roots alike, and at most one
 // first-order factor on each side. p + q poles make (p+q)/2 pairs and, if odd, one single; q zeros likewise.
 #pragma once
 

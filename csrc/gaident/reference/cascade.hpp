@@ -273,7 +273,7 @@ public:
     }
 
 private:
-    R K_;  // held outside: it can be large, and a large matrix loses digits
+    R K_;  // kept outside: it can be large, and a large matrix loses digits
     Matrix<R> transition_;
     std::vector<R> output_, x_;
 };

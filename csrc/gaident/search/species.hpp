@@ -264,7 +264,7 @@ private:
     Resources resources_;
     std::span<const Species> all_;
     std::vector<std::unique_ptr<Island>> islands_;
-    std::size_t asked_islands_ = 0;  // the first so many; the last may hold species that are not asked for
+    std::size_t asked_islands_ = 0;  // the first so many; the last may contain species that are not asked for
     std::vector<Place> places_;      // of each species
     SpeciesTrial<Fit> trial_;
 };

@@ -320,7 +320,7 @@ void Batch::run(std::size_t r, const Candidates& candidates, double* sums) {
         if (!in_float_) {
             advance(views_[r], record, bank_, static_cast<int>(lanes), part);
         } else {
-            // Two groups side by side; a group with a lane that 24 bits cannot hold is run in double as well, for that lane.
+            // Two groups side by side; a group with a lane that 24 bits cannot represent is run in double as well, for that lane.
             const std::size_t groups = (lanes + W - 1) / W;
             for (std::size_t g = 0; g < groups; g += 2) {
                 const DoubleGroup& second = bank_[g + 1 < groups ? g + 1 : g];

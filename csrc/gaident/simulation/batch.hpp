@@ -47,7 +47,7 @@ inline constexpr std::size_t chunk_samples = 512;
 Delta<double> plant_of(const Factors<double>& g, const Loop& loop, double sample_time);
 
 // The start of a record in steady motion: constant velocity y0 needs the torque y0 / G(0), which in a closed loop the integrator
-// holds. Writes start_states() numbers.
+// stores. Writes start_states() numbers.
 void steady_start(const Delta<double>& plant, const Record& record, const Loop& loop, double* start);
 
 // Response (closed loop, or plant where the loop is stepped or open) and initial state of one candidate on one record.
@@ -57,7 +57,7 @@ struct Prepared {
     double s = 0.0;
 };
 
-// `start` holds start_states() numbers, or is null: then the record's own start (rest, or steady motion) is used.
+// `start` contains start_states() numbers, or is null: then the record's own start (rest, or steady motion) is used.
 Prepared prepare(const Factors<double>& g, const Record& record, const Loop& loop, const double* start);
 
 // Responses and initial states of up to eight candidates on one record: as prepare(), bit for bit in the continuous loop.
@@ -69,8 +69,8 @@ void load_group(const Experiment& experiment, const Record& record, std::span<co
 
 // Error sums of candidates of any mixture of structures.
 // All memory is taken in the constructor.
-// In float a candidate that 24 bits cannot hold (float_suffices) is run in double all the same, and so is every loop with limits,
-// where a rounded torque goes through the plant, and every servo loop, whose filters leave poles far from z = 1.
+// In float a candidate that 24 bits cannot represent (float_suffices) is run in double all the same, and so is every loop with
+// limits, where a rounded torque goes through the plant, and every servo loop, whose filters leave poles far from z = 1.
 class Batch {
 public:
     Batch(const Experiment& experiment, std::size_t capacity, bool in_float);

@@ -34,8 +34,8 @@ void simulate(const Factors<double>& g, std::span<const double> input, double sa
             [](const R& x) { return static_cast<double>(x); }, w, u);
 }
 
-// In 32-bit arithmetic: plain floats where they hold the loop's polynomial, pairs of floats where they do not, and where a limit
-// keeps controller and plant apart, so that a torque rounded to 24 bits would go through the plant.
+// In 32-bit arithmetic: plain floats where they represent the loop's polynomial, pairs of floats where they do not, and where a
+// limit keeps controller and plant apart, so that a torque rounded to 24 bits would go through the plant.
 inline void simulate_in_float(const Factors<double>& g, std::span<const double> input, double sample_time, const Loop& loop,
                               const double* start, std::span<double> velocity, std::span<double> torque) {
     Record record;

@@ -1,6 +1,6 @@
 // A search on the host in the arithmetic of a drive: genes, coefficients, recurrence and fitness all in it, by the same
 // templates (candidate.hpp), so that the run is that of static_search.hpp bit for bit.
-// Costs come back as doubles, which hold every number of every arithmetic.
+// Costs come back as doubles, which contain every number of every arithmetic.
 #pragma once
 
 #include "../simulation/fitness.hpp"

@@ -54,8 +54,8 @@ public:
     StaticSearch(const StaticSearch&) = delete;
 
     // Whether there was room for the sample [rad/s].
-    // One that is not finite or beyond twice the peak, whose deviation from the command a word may not hold, spoils the record:
-    // no model comes of it.
+    // One that is not finite or beyond twice the peak, whose deviation from the command a word may not represent, spoils the
+    // record: no model comes of it.
     bool feed(double command, double velocity) {
         const int k = samples();
         if (k == max_samples) return false;

@@ -15,7 +15,7 @@ __all__ = ["SHELLS", "add_log_commands", "add_log_options", "gain", "number"]
 
 SHELLS = ("bash", "zsh", "fish", "tcsh")
 COLUMNS_HELP = """\
-Lists what a log holds: the names of its columns as --columns takes them, units, range, sample time, and what
+Lists what a log contains: the names of its columns as --columns takes them, units, range, sample time, and what
 stands in the way of their use. Formats: CSV and other text tables (of TwinCAT Scope, MR Configurator2, EPOS
 Studio, NI or ROS as well), MAT, NPZ, HDF5, Parquet, TDMS, MDF, traces of SINUMERIK (XML).
 """
@@ -155,7 +155,7 @@ def _add_text_options(group: Any) -> None:
 
 def add_log_commands(command: Callable[..., Any]) -> None:
     """The commands around logs; `command` makes one: (name, files, line, text, examples)."""
-    sub = command("columns", "LOG... ", "what a log holds: names, units, range, sample time", COLUMNS_HELP)
+    sub = command("columns", "LOG... ", "what a log contains: names, units, range, sample time", COLUMNS_HELP)
     sub.add_argument("logs", nargs="+", metavar="LOG", help="log file")
     _add_text_options(sub)
     sub.add_argument("--json", action="store_true", help="print JSON instead of a table, a list where several logs are given")

@@ -24,7 +24,7 @@ Finds structure (p,q), poles, zeros and mechanical parameters of the drive behin
 
 With a controller, the log's velocity command drives the simulated loop; without one, its torque drives
 the model. Formats: CSV and other text tables, MAT, NPZ; with the extra gaident[formats] also HDF5, Parquet,
-TDMS and MDF. `gaident columns LOG` lists what a log holds, `gaident init LOG` writes its drive.toml.
+TDMS and MDF. `gaident columns LOG` lists what a log contains, `gaident init LOG` writes its drive.toml.
 """
 IDENTIFY_EXAMPLES = """\
 examples:
@@ -105,7 +105,7 @@ REPRODUCE_HELP = """\
 Re-creates the tables and figures of the paper behind the method: what follows from its own numbers (Tables III
 to V), and on a simulated rig with dry friction, in place of the original one, Figs. 6 to 8, the comparison with
 least squares, the times, and the diagnosis that names the friction. Says what is reproduced, what is simulated,
-and where the paper disagrees with itself. Writes paper.html, which holds its pictures, and the pictures as PNG.
+and where the paper disagrees with itself. Writes paper.html, which contains its pictures, and the pictures as PNG.
 """
 
 

@@ -11,7 +11,7 @@ Writes a saved diagnosis or identification as one HTML page that can be sent to 
 against simulated, what is wrong, cause and evidence, parameters, before and after, what could not be tested, the
 next experiment with its command, how it was computed. The page needs no network and no other file (about 1.7 MB,
 with --pictures 0.3).
-A saved result holds no samples: give the logs it was made from, and the page has its curves.
+A saved result contains no samples: give the logs it was made from, and the page has its curves.
 Of several results, before and after a repair or the axes of a machine, it is one page: an overview, what differs,
 and what each says. Which log belongs to which result, its samples tell.
 """

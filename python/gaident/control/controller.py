@@ -22,7 +22,7 @@ Vector = NDArray[np.float64]
 
 
 class LoopSignals(Protocol):
-    """What a log holds of a controller's signals; a `gaident.Record` is one."""
+    """What a log contains of a controller's signals; a `gaident.Record` is one."""
 
     @property
     def dt(self) -> float: ...
@@ -72,7 +72,7 @@ class Controller(ABC):
     @property
     @abstractmethod
     def one_equation(self) -> bool:
-        """Whether one difference equation holds controller and plant, limits left out: of the bare PI."""
+        """Whether one difference equation describes controller and plant, limits left out: of the bare PI."""
 
     @property
     @abstractmethod
@@ -150,7 +150,7 @@ class Controller(ABC):
         """Whether one difference equation takes a log that starts at rest from line to line, although it samples faster.
 
         poles: of the plant beside it. Its commands are logged, and controller and plant together are linear and of an order that
-        the core holds.
+        the core contains.
         """
         return False
 
@@ -168,7 +168,7 @@ class Controller(ABC):
 
     @abstractmethod
     def replayable(self, log: LoopSignals) -> bool:
-        """Whether the log holds every signal that it makes its torque of, at each of its samples."""
+        """Whether the log contains every signal that it makes its torque of, at each of its samples."""
 
     @abstractmethod
     def torque_of(self, log: LoopSignals, also: Limiting | None = None) -> Vector:

@@ -143,7 +143,7 @@ def line_record(
 
 
 def is_one_equation(dt: float, controller: Controller, poles: int) -> bool:
-    """Whether one difference equation holds a controller and a plant with so many poles, from line to line of a log."""
+    """Whether one difference equation describes a controller and a plant with so many poles, from line to line of a log."""
     every = controller.log_every(dt)
     try:
         order = _core.servo_order(loop=loop(controller, dt), clock=_core.Clock(period=dt / every, log_every=every))

@@ -95,7 +95,7 @@ class FoundNumbers:
 def loosened(covariance: Matrix) -> Matrix:
     """A covariance with a part of its correlations: of numbers that are off by what a log lost, and not by noise.
 
-    The deviations of each alone hold that; of a combination that noise would show closely it is not known.
+    The deviations of each alone contain that; of a combination that noise would show closely it is not known.
     """
     kept = POLICY.kept_correlation
     return np.asarray(kept * covariance + (1.0 - kept) * np.diag(np.diag(covariance)))

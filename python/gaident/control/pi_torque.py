@@ -24,7 +24,7 @@ Vector = NDArray[np.float64]
 def pi_torque(command: Vector, velocity: Vector, dt: float, controller: VelocityGains, initial_integral: float = 0.0) -> Vector:
     """The torque [N m], shape (n,), that `controller` makes of command and measured velocity [rad/s], shape (n,) each.
 
-    initial_integral: what the integrator held before sample 0 [N m]. Both loops of `PI` share this rule.
+    initial_integral: what the integrator stored before sample 0 [N m]. Both loops of `PI` share this rule.
     """
     return pi_block(command - velocity, dt, controller, 0.0, initial_integral)[0]
 

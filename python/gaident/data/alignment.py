@@ -181,7 +181,7 @@ def _channels(other: object, dt: float | None) -> tuple[dict[str, NDArray[np.flo
     if not isinstance(other, Mapping):
         raise RecordError(f"other={other!r:.60} is neither a Record nor a mapping of channels; give {{'velocity': ...}} with dt=")
     if dt is None:
-        raise RecordError("other holds channels without a Record: give their sample time dt= [s] too")
+        raise RecordError("other contains channels without a Record: give their sample time dt= [s] too")
     unknown = next((name for name in other if name not in CHANNELS), None)
     if unknown is not None:
         raise RecordError(f"other: {unknown!r} is no channel; known are {', '.join(CHANNELS)}")

@@ -226,7 +226,7 @@ def channels_of(table: LogTable, wanted: Wanted) -> dict[str, Column]:
     if len(table.columns) == 1 and wanted.measured:
         hint = "" if table.form == "DataFrame" else f"; if other columns were not recognised, give {arg('delimiter')}"
         raise ReadError(
-            f"{table.path}: the log holds one column only, {table.columns[0].key!r}, but a record needs "
+            f"{table.path}: the log contains one column only, {table.columns[0].key!r}, but a record needs "
             f"the velocity and a command or torque{hint}"
         )
     if wanted.columns is None:

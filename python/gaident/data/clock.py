@@ -1,4 +1,4 @@
-"""Which column holds the time of a log's channels, and what one of its units is in s."""
+"""Which column contains the time of a log's channels, and what one of its units is in s."""
 
 from __future__ import annotations
 

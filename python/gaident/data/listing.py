@@ -1,4 +1,4 @@
-"""What a log holds, for the person who has to name its columns: names, units, ranges, sample times."""
+"""What a log contains, for the person who has to name its columns: names, units, ranges, sample times."""
 
 from __future__ import annotations
 
@@ -80,7 +80,7 @@ class Listing:
     columns : tuple of ColumnInfo
         Its columns of numbers.
     others : tuple of str
-        What it holds besides.
+        What it contains besides.
 
     See Also
     --------

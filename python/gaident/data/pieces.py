@@ -51,7 +51,7 @@ def read_pieces(
 
     A gap is a step of the time that is longer than five of the usual ones.
     Nothing is made up for it: each piece has an initial state of its own, and `identify` and `diagnose` take the list.
-    The columns that are read are held in memory.
+    The columns that are read are kept in memory.
 
     Parameters
     ----------

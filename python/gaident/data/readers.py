@@ -183,7 +183,7 @@ def read(
 
     See Also
     --------
-    columns : What a log holds, before its columns are named.
+    columns : What a log contains, before its columns are named.
 
     Examples
     --------

@@ -302,7 +302,7 @@ class Record:
         return self.with_channels(**moved)
 
     def plot(self, axis: str = "rotary", units: Mapping[str, str | float] | None = None) -> Figure:
-        """Draw the channels over time: what the log holds, before anything is fitted.
+        """Draw the channels over time: what the log contains, before anything is fitted.
 
         Parameters
         ----------
@@ -361,7 +361,7 @@ class Record:
         missing = [key for key in ("dt", "name", *CHANNELS[:4]) if key not in data]
         if missing:
             raise RecordError(f"the saved record lacks {', '.join(missing)}; save it again")
-        # Early files hold neither of these, nor a position command.
+        # Early files contain neither of these, nor a position command.
         kind, notes = data.get("torque_is", COMMANDED), data.get("notes", ())
         return cls(data["dt"], name=data["name"], torque_is=kind, notes=notes, **{key: data.get(key) for key in CHANNELS})
 

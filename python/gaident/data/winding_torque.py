@@ -1,4 +1,4 @@
-"""The torque of a log that holds the motor's voltage or current instead."""
+"""The torque of a log that contains the motor's voltage or current instead."""
 
 from __future__ import annotations
 

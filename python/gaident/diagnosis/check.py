@@ -9,7 +9,7 @@ They contradict each other where
 and, for a torque, |a - b| > check_torque of the torque's rms.
 The second and third say that the difference matters. Then a note names both.
 
-The force errors of both are held against each other by the same rule: a note says that the diagnosed model, a, loses where
+The force errors of both are compared by the same rule: a note says that the diagnosed model, a, loses where
 
     a - b > 0 beyond the variation over blocks of the held-out data,   a > loses b,   a - b > check_torque of the torque's rms.
 """

@@ -39,7 +39,7 @@ class DriveDraft:
     """text: the drive.toml; fill_in: what a person must add, one line each; channels: channel -> column.
 
     torque_is: what the torque is, as its column's name says; None where it does not, or there is none, or there are several axes.
-    axes: their names where the log holds several; channels are called "NAME.velocity" then.
+    axes: their names where the log contains several; channels are called "NAME.velocity" then.
     """
 
     text: str
@@ -52,7 +52,7 @@ class DriveDraft:
 def draft(listing: Listing, values: Mapping[str, NDArray[np.float64]]) -> DriveDraft:
     """The drive.toml for a log; values: its columns in the file's units, {} where it is too long to be looked into.
 
-    Raises ReadError where the log holds nothing that could be a channel.
+    Raises ReadError where the log contains nothing that could be a channel.
     """
     several = axes_of(listing)
     if several:
@@ -60,7 +60,7 @@ def draft(listing: Listing, values: Mapping[str, NDArray[np.float64]]) -> DriveD
         return _together(drafts)
     guess = with_content(listing, guess_channels(listing), values)
     if not guess.channels and not any(c.samples > 1 for c in listing.columns):
-        raise ReadError(f"{listing.path}: the log holds no column of more than one number; give a log of a run")
+        raise ReadError(f"{listing.path}: the log contains no column of more than one number; give a log of a run")
     return _Draft(listing, guess, values).done()
 
 
@@ -229,7 +229,7 @@ class _Draft:
             and c.lowest != c.highest
         ]
         # no decision: how many columns a remark names
-        others = f"; the log also holds {', '.join(map(_quoted, rest[:8]))}" if rest else ""
+        others = f"; the log also contains {', '.join(map(_quoted, rest[:8]))}" if rest else ""
         if not self.guess.channels.keys() & {"velocity", "position"}:
             either = self._either("velocity", "position")
             text = f", not its command: {either}" if either else f" (or position){others}"

@@ -214,7 +214,7 @@ def _is_proposal(path: str) -> bool:
 
 
 def axes_in(path: str) -> tuple[str, ...]:
-    """The names of the axes that a drive file holds, `[axes.NAME]`; none in a file of one axis. Raises ReadError."""
+    """The names of the axes that a drive file contains, `[axes.NAME]`; none in a file of one axis. Raises ReadError."""
     axes = _parsed(path).get("axes", {})
     if not isinstance(axes, Mapping) or not all(isinstance(own, Mapping) for own in axes.values()):
         raise ReadError(f"{path}: axes is no table of axes: write [axes.x], and below it what belongs to x alone")
@@ -229,7 +229,7 @@ def read_drive_file(path: str, axis: str | None = None) -> dict[str, dict[str, A
     data, names = _parsed(path), axes_in(path)
     own = data.pop("axes", {})
     if axis is None and names:
-        raise ReadError(f"{path}: this drive file holds the axes {', '.join(names)}: say which with --select NAME")
+        raise ReadError(f"{path}: this drive file contains the axes {', '.join(names)}: say which with --select NAME")
     common = _checked(data, path, "")
     if axis is None:
         return common
@@ -239,7 +239,7 @@ def read_drive_file(path: str, axis: str | None = None) -> dict[str, dict[str, A
 
 
 def _parsed(path: str) -> dict[str, Any]:
-    """What a TOML file holds. Raises ReadError."""
+    """What a TOML file contains. Raises ReadError."""
     if sys.version_info >= (3, 11):  # no decision: a version of Python
         import tomllib
     else:
@@ -257,7 +257,7 @@ def _parsed(path: str) -> dict[str, Any]:
         raise ReadError(f"{path}: {otherwise or f'this is not TOML ({error}); see gaident identify --help'}") from None
     if not data:
         raise ReadError(
-            f"{path}: this drive file is empty: it holds {_SECTIONS} and {', '.join(KEYS[''])}; leave it out otherwise"
+            f"{path}: this drive file is empty: it contains {_SECTIONS} and {', '.join(KEYS[''])}; leave it out otherwise"
         )
     return data
 
@@ -311,7 +311,7 @@ def _as_toml_has_it(text: str, error: str) -> str:
             continue
         written = sign + (whole.lstrip("0") or "0") + ("" if part is None else f".{part or 0}") + power
         if written != found[0]:
-            return f"line {number}: {key.strip()} holds {found[0]}, which is no number in TOML: write {written}"
+            return f"line {number}: {key.strip()} contains {found[0]}, which is no number in TOML: write {written}"
     return ""
 
 

@@ -1,4 +1,4 @@
-"""What a log holds beyond the names of its columns: axes, gaps in its time, motion by its values."""
+"""What a log contains beyond the names of its columns: axes, gaps in its time, motion by its values."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ from gaident.policy.table import POLICY
 __all__ = ["axes_of", "gaps_of", "with_content"]
 
 _OF_AN_AXIS = re.compile(r"([A-Za-z0-9_-]+)[.:/|\\]")
-"""How the name of a column begins where the log holds several axes: X.n_act, axis1/torque."""
+"""How the name of a column begins where the log contains several axes: X.n_act, axis1/torque."""
 
 
 def axes_of(listing: Listing) -> dict[str, tuple[Listing, Guess]]:
-    """Axis -> its own columns, those that belong to all with them, and their channels; {} where the log holds one axis.
+    """Axis -> its own columns, those that belong to all with them, and their channels; {} where the log contains one axis.
 
     An axis is what the names of a motion and of what drives it begin with.
     """

@@ -35,9 +35,9 @@ estimates of one model; two models are compared by the information criterion.
 
     ratio = sqrt(V/N) / sigma
 
-is held against the level that records without effects pass, by the errors that V is of. Whitened errors (`noise_ratio`) are the
+is compared with the level that records without effects pass, by the errors that V is of. Whitened errors (`noise_ratio`) are the
 innovations, and may be smaller than the noise where that is slow. Errors before whitening (`free_run_ratio`), in the loop where
-there is one, hold all that disturbs the axis beside the sensor's noise: their ratio is larger, and a misfit that the noise model
+there is one, have all that disturbs the axis beside the sensor's noise: their ratio is larger, and a misfit that the noise model
 has taken shows in them alone.
 """
 

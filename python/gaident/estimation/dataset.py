@@ -48,7 +48,7 @@ class DataSet:
 
     controller: what closed the loop on the drive; None: unknown, the torque drives the model. `loop` is what a simulation closes.
     turned: the record itself with that angle; free: torque-driven, without an angle that was not measured; read: the records
-    as the controller read them, which may hold samples that the fit leaves out. finest: no substep of a simulation is much
+    as the controller read them, which may contain samples that the fit leaves out. finest: no substep of a simulation is much
     shorter [s]; resolution: step of the lattice that all velocities lie on [rad/s], 0: none; known_noise: standard deviation
     of the velocity's noise where the records cannot show it; loop_follows: whether the logged torque is what the controller
     makes; torque_measured: whether it is a measured one, with noise on it, behind the actuator; axis: "rotary" or "linear".
@@ -160,12 +160,12 @@ class DataSet:
 
     @cached_property
     def angle_logged(self) -> bool:
-        """Whether every record holds the angle."""
+        """Whether every record contains the angle."""
         return all(r.position is not None for r in self.records)
 
     @cached_property
     def torque_logged(self) -> bool:
-        """Whether every record holds the controller's torque, and not one that the given controller was made to give."""
+        """Whether every record contains the controller's torque, and not one that the given controller was made to give."""
         return all(r.torque is not None for r in (self.read or self.records))
 
     @cached_property
@@ -201,7 +201,7 @@ class DataSet:
 
     @cached_property
     def simulates_loop(self) -> bool:
-        """Whether command and controller can drive a model from standstill, with what the integrator held.
+        """Whether command and controller can drive a model from standstill, with what the integrator stored.
 
         Never where they do not make the logged torque; a measured one, which has noise and an error of its own, shows that less.
         """
@@ -212,7 +212,7 @@ class DataSet:
 
     @cached_property
     def stored(self) -> tuple[float, ...]:
-        """What the integrator held before each of the records, for a load [N m]."""
+        """What the integrator stored before each of the records, for a load [N m]."""
         loop = None if self.controller is None else self.controller.simulated_with(self.dt)
         return tuple(0.0 if loop is None else stored_torque(r, loop) for r in self.records)
 

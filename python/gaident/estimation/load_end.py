@@ -1,6 +1,6 @@
 """The load's end of two masses, as the linear part of a model has it: what its torques do to the motor, and its angle.
 
-With x = theta_M - theta_L, the motor held and a torque T_L at the load, the shaft drives the motor with T_M; and with the motor
+With x = theta_M - theta_L, the motor fixed and a torque T_L at the load, the shaft drives the motor with T_M; and with the motor
 moved by w_M the load follows with w_L. Both are one transfer function:
 
     T_M/T_L = w_L/w_M = F(s) = (DG/JL s + f0)/(s^2 + f1 s + f0),  f1 = (DL + DG)/JL, f0 = KG/JL

@@ -164,7 +164,7 @@ def _of_error(hypothesis: Hypothesis, x: Vector) -> Hashable:
 class Objective:
     """Errors over one data set.
 
-    weight: (N,), 0 for samples that are left out. measured: (N,), the velocity that models are held against [rad/s].
+    weight: (N,), 0 for samples that are left out. measured: (N,), the velocity that models are compared with [rad/s].
     """
 
     data: DataSet

@@ -2,7 +2,7 @@
 
     u = J a + (B+ w or B- w) + (C+ or -C-) + A cos(2 pi x/P) + B sin(2 pi x/P)
 
-Inertia and friction are fitted alone, the last two columns are held against what they leave, for every P that the path shows a
+Inertia and friction are fitted alone, the last two columns are compared with what they leave, for every P that the path shows a
 few times. One is the period where BIC falls by more than a free function of one signal may let it (P is a number, too, and so
 many were tried), and by a material share. A hum of one frequency is such a wave while the speed does not change: a frequency in
 time has to explain less, beyond the margin of two rivals.

@@ -91,7 +91,7 @@ class OpenLoop:
         return self._under(parameters, X, self.data.free if self.own_angle else self.data.driven)
 
     def _under(self, parameters: Parameterisation, X: Matrix, records: Sequence[Record], left_out: Sequence[str] = ()) -> Matrix:
-        """Rows of x under the torques of these records; left_out: effects that the torques hold already."""
+        """Rows of x under the torques of these records; left_out: effects that the torques contain already."""
         if not self.own_angle and _bends_the_angle(self.data, parameters):
             return np.vstack([_of_true_angle(self.data, parameters, x, records, None, left_out) for x in X])
         names, values = parameters.values(X, left_out)

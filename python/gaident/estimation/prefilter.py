@@ -6,7 +6,7 @@ Where a model is not exact, what is minimised decides what comes out. A prefilte
     e_L(n) = L(q) e(n),   minimise sum of e_L^2
 
 The free run of a rigid axis integrates every torque that the model lacks: e = d/(J s + B). Its errors are slow, and a long
-record holds few of them that are independent. With
+record contains few of them that are independent. With
 
     L(s) = (s + c) F(s)
 

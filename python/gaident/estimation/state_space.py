@@ -82,7 +82,7 @@ def disturbed(plant: Discretised, controller: PI | None, dt: float) -> Discretis
 
         w (1 + D (kp + h)) = C x + D (J + f),  u = J - (kp + h) w,  J(n+1) = J(n) - 2 h w,  h = ki dt/2
 
-    with J what the integrator holds of the past. Without a controller the plant itself.
+    with J what the integrator stores of the past. Without a controller the plant itself.
     """
     if controller is None:
         return plant

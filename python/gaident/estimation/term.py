@@ -92,7 +92,7 @@ class Term:
     curve: Callable[[Vector, Mapping[str, float]], Vector] | None = None  # static torque at velocities [rad/s], as friction
 
     def stands_with(self, effects: Iterable[str]) -> bool:
-        """Whether a model with these effects holds what its torque depends on."""
+        """Whether a model with these effects contains what its torque depends on."""
         return not self.beside or not self.beside.isdisjoint(effects)
 
     @cached_property

@@ -62,8 +62,8 @@ def _chain(model: Model) -> Transfer:
     others = [effect.name for effect in model.effects if effect.name not in LINEAR]
     if others:
         raise ModelError(
-            f"the model has {', '.join(others)}, which no linear system can hold: take it out with without_effect, use "
-            f"model.linear, or write the whole with to_c (of the effects a linear system holds {', '.join(LINEAR)})"
+            f"the model has {', '.join(others)}, which no linear system can contain: take it out with without_effect, use "
+            f"model.linear, or write the whole with to_c (of the effects a linear system contains {', '.join(LINEAR)})"
         )
     mechanism = model.mechanism
     chain = Transfer(mechanism.gain, mechanism.poles, mechanism.zeros)

@@ -69,7 +69,7 @@ def distinct(records: Sequence[Record]) -> list[str]:
         if first < i:
             names = [f"record {k} ({records[k].name})" if records[k].name else f"record {k}" for k in (i, first)]
             raise RecordError(
-                f"{names[0]} holds the same data as {names[1]}: counted twice it would halve every variance; leave one out"
+                f"{names[0]} contains the same data as {names[1]}: counted twice it would halve every variance; leave one out"
             )
     return digests
 

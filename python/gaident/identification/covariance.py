@@ -6,7 +6,7 @@ The estimate minimises the plain simulation error e; its covariance to first ord
 
 with J = de/dx, F the whitening filter of the residual and s the standard deviation of F e; S is that of stationary noise, so that
 the first samples have their share of it too. For white residuals this is s^2 (J'J)^-1.
-J itself is never held: the core sums its products.
+J itself is never stored: the core sums its products.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """Logs of a controller, cut where a limit acts: what it makes of the logged signals, and what is left of the logged torque.
 
-A stretch is what lies between two limits: what the integrator held before it is free.
+A stretch is what lies between two limits: what the integrator stored before it is free.
 Of a record that starts in motion the first lines are left out, in which filters forget what was before it.
 """
 
@@ -31,7 +31,7 @@ FORGOTTEN = 50  # no decision: lines; five time constants of a low pass of ten l
 class Log:
     """Lines of a record; velocity: at the controller's samples. stretch (n,): number of the line's stretch; -1: none.
 
-    moving: it starts in motion, and what the integrator held before is not known.
+    moving: it starts in motion, and what the integrator stored before is not known.
     """
 
     dt: float

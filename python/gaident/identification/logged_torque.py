@@ -46,7 +46,7 @@ Vector = NDArray[np.float64]
 def not_followed(records: Sequence[Record], controller: Controller | None) -> tuple[Text, ...]:
     """A sentence for each record whose logged torque does not follow from this controller; () where none can be compared.
 
-    Compared are logs slower than the controller that start at rest and hold what it reads.
+    Compared are logs slower than the controller that start at rest and contain what it reads.
     """
     if controller is None:
         return ()
@@ -63,7 +63,7 @@ def not_followed(records: Sequence[Record], controller: Controller | None) -> tu
 
 
 def comparable(rec: Record, controller: Controller) -> bool:
-    """Whether a record that is slower than this controller starts at rest and holds torque and all that it reads."""
+    """Whether a record that is slower than this controller starts at rest and contains torque and all that it reads."""
     needed = (rec.torque, *(getattr(rec, channel) for channel in controller.reads))
     return (
         controller.log_every(rec.dt) > 1

@@ -38,7 +38,7 @@ class Autoregression(NamedTuple):
 
 def highest_order(lengths: Sequence[int], max_order: int = MAX_ORDER) -> int:
     """The largest order that so many samples are asked for."""
-    # no decision: the orders that a record can hold; a criterion chooses
+    # no decision: the orders that a record can contain; a criterion chooses
     return max(0, min(max_order, sum(lengths) // 20, min(lengths) - 1))
 
 

@@ -1,4 +1,4 @@
-"""The effects that a linear system can hold, as transfer functions."""
+"""The effects that a linear system can contain, as transfer functions."""
 
 from __future__ import annotations
 

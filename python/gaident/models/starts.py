@@ -62,7 +62,7 @@ def starts_moving(rec: Record, controller: Controller | None) -> bool:
 def constant_beside(off: NDArray[np.float64], size: float) -> float:
     """The mean of what a torque of this size is off by [N m], where it stands out of the rest and is not to be neglected; or 0.
 
-    That is what an integrator held before the record, for a load, where `off` is the logged torque minus that made from rest.
+    That is what an integrator stored before the record, for a load, where `off` is the logged torque minus that made from rest.
     """
     if len(off) < POLICY.least_rows:
         return 0.0

@@ -1,4 +1,4 @@
-"""What the integrator of a controller held before a record: the torque of a load that was there already, as on a vertical axis.
+"""What the integrator of a controller stored before a record: the torque of a load that was there already, as on a vertical axis.
 
 From rest, the controller makes u_0 of command and velocity. Its integral before the record adds a constant, behind filters too:
 they stood in it. So it is the mean of u - u_0, where that stands out of what else the two are off by:
@@ -38,7 +38,7 @@ PARTS = 20  # no decision: of a record, the longer of the two spans; from 5 to 8
 
 
 def stored_torque(rec: Record, controller: Controller) -> float:
-    """What the integrator held before a record [N m], for a load; 0 where nothing shows it.
+    """What the integrator stored before a record [N m], for a load; 0 where nothing shows it.
 
     The torque of a log that is slower than its controller is the mean over each line, as `driven_by` makes it.
     """

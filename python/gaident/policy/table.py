@@ -126,7 +126,7 @@ class Decisions:
     )
     swings: float = noise(0.5, "1", "sum of rho^2 of errors, from which they swing where it is above the sum of rho", REAL)
 
-    # Is a finding a cause, or does it only describe what the library does not hold?
+    # Is a finding a cause, or does it only describe what the library does not contain?
     of_its_size: float = cause(0.25, "1", "part of a finding's gain that a free function beside it may still find", DRIVES)
     stands: float = cause(
         0.9,

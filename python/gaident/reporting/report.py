@@ -57,7 +57,7 @@ def report(
     path : str or path-like
         The file to write.
     records : Record or sequence of Record, optional
-        None: as used. A loaded result holds none, and its page says what is left out for that.
+        None: as used. A loaded result contains none, and its page says what is left out for that.
         Of several results each takes those that it was made of.
     validation : Record or sequence of Record, optional
         The records that were held out, likewise.
@@ -133,7 +133,7 @@ def _named(results: object) -> dict[str, Diagnosis | Identification]:
         raise GaidentError(f"result is {type(results).__name__}: give a Diagnosis or an Identification, or several of them")
     listed = list(results.values()) if isinstance(results, Mapping) else list(results)
     if not listed or not all(isinstance(one, Diagnosis | Identification) for one in listed):
-        raise GaidentError("result holds something else than results: give each a Diagnosis or an Identification, at least one")
+        raise GaidentError("result contains other things than results: give each a Diagnosis or an Identification, at least one")
     if isinstance(results, Mapping):
         return {str(name): one for name, one in results.items()}
     found: dict[str, Diagnosis | Identification] = {}

@@ -45,7 +45,7 @@ class Diagnosis(SavedResult):
     not_testable : mapping of str to str
         Effect -> why the records say nothing about it.
     model : Model
-        The extended model; the identified linear one where it holds no effect.
+        The extended model; the identified linear one where it contains no effect.
     before, after : Fitness
         The linear and the extended model on held-out data.
     driver : str or None
@@ -88,7 +88,7 @@ class Diagnosis(SavedResult):
     bootstrap : int
         Simulated records of the bootstrap as they were asked for.
     torque_logged : bool
-        Whether all records hold the torque.
+        Whether all records contain the torque.
     loop_follows : bool
         False where the torque does not follow from command and velocity through the simulated controller; its free runs are then
         not the drive's.
@@ -236,7 +236,7 @@ class Diagnosis(SavedResult):
         Raises
         ------
         GaidentError
-            Where a loaded diagnosis is given no records, or `records` holds something else.
+            Where a loaded diagnosis is given no records, or `records` contains something else.
         SettingsError
             For another axis.
         """
@@ -265,7 +265,7 @@ class Diagnosis(SavedResult):
         Raises
         ------
         GaidentError
-            Where a loaded diagnosis is given no records, or `records` holds something else.
+            Where a loaded diagnosis is given no records, or `records` contains something else.
         RecordError
             Where they show no frequency response.
         """

@@ -204,7 +204,7 @@ class Identification(SavedResult):
         Raises
         ------
         GaidentError
-            Where a loaded identification is given no records, or `records` holds something else.
+            Where a loaded identification is given no records, or `records` contains something else.
         """
         return picture("plot_identification", self, self._drawn(records, "plot"), axis=axis)
 
@@ -231,7 +231,7 @@ class Identification(SavedResult):
         Raises
         ------
         GaidentError
-            Where `records` holds something else than records.
+            Where `records` contains something else than records.
         RecordError
             Where the record shows no frequency response.
         """

@@ -46,7 +46,7 @@ class SavedResult(ABC):
         """As `_chosen`, at least one. Raises GaidentError with the call that has one."""
         chosen = self._chosen(records)
         if not chosen:
-            raise GaidentError(f"records: a loaded {self.KIND} holds no data; give {method}(records)")
+            raise GaidentError(f"records: a loaded {self.KIND} contains no data; give {method}(records)")
         return chosen
 
 

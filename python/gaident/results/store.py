@@ -72,7 +72,7 @@ def load(path: str | os.PathLike[str]) -> Saved:
         raise GaidentError(f"{path}: line {error.lineno} is not JSON ({error.msg}); give a file that save() wrote") from error
     reader = READERS.get(str(data.get("schema"))) if isinstance(data, dict) else None
     if reader is None:
-        raise GaidentError(f"{path}: holds no saved identification, diagnosis or record; give a file that save() wrote")
+        raise GaidentError(f"{path}: contains no saved identification, diagnosis or record; give a file that save() wrote")
     try:
         return reader(decoded(data))
     except GaidentError as error:

@@ -185,7 +185,7 @@ def std_band(std: float) -> tuple[Band, ...]:
 
 
 def robust_limits(values: Vector) -> tuple[float, float]:
-    """Limits that hold all but the wildest half per cent at either end, zero included, with a margin."""
+    """Limits that contain all but the wildest half per cent at either end, zero included, with a margin."""
     low, high = (float(x) for x in np.quantile(values, (0.005, 0.995)))
     low, high = min(low, 0.0), max(high, 0.0)
     margin = 0.15 * (high - low) or 1.0

@@ -44,7 +44,7 @@ def test_it_says_what_is_wrong_and_writes_files(here: Path, capsys: pytest.Captu
     # A diagnosis carries a model: it simulates, and can be told from an identification.
     assert main(["simulate", "dia.json", "run1.csv", "--out", "again.csv"]) == 0
     assert "fit 99." in capsys.readouterr().out
-    assert "holds no identification" in refusal(["diagnose", "run0.csv", *LOOP, "--model", "dia.json"], capsys)
+    assert "contains no identification" in refusal(["diagnose", "run0.csv", *LOOP, "--model", "dia.json"], capsys)
 
 
 def test_json_is_what_out_saves_and_a_model_is_taken(here: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -1,4 +1,4 @@
-"""gaident export: the files hold the result's model and numbers."""
+"""gaident export: the files contain the result's model and numbers."""
 
 from __future__ import annotations
 
@@ -87,7 +87,7 @@ def test_a_table_of_all_numbers(here: Path, result: ga.Diagnosis) -> None:
 def test_a_record_is_no_result(here: Path, result: ga.Diagnosis, capsys: pytest.CaptureFixture[str]) -> None:
     result.records[0].save("record.json")
     assert main(["export", "record.json", "--to", "csv"]) == 2
-    assert "holds a record, no model" in capsys.readouterr().err
+    assert "contains a record, no model" in capsys.readouterr().err
 
 
 def test_a_printed_command_can_be_pasted(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -293,8 +293,8 @@ def test_experiment_writes_the_command_of_a_first_record(here: Path, capsys: pyt
     said = capsys.readouterr().out
     assert "written: first.csv" in said and "give kp to keep both" in said
     assert "To give them: --kp and --inertia LOW HIGH, or the drive file.\n" in said
-    held = ga.read_columns("first.csv")
-    assert len(held["time [s]"]) <= 2000 and np.abs(held["command [rad/s]"]).max() <= 100
+    columns = ga.read_columns("first.csv")
+    assert len(columns["time [s]"]) <= 2000 and np.abs(columns["command [rad/s]"]).max() <= 100
     assert main(["experiment", "--drive", "d.toml"]) == 0
     out, err = capsys.readouterr()
     assert out == Path("first.csv").read_text() and "Torque and speed limit are not promised" in err

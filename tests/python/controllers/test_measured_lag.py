@@ -84,7 +84,7 @@ def test_the_unit_of_torque_decides_nothing(unit: float) -> None:
 
 @pytest.mark.parametrize("begin", [0, 430, 1000])
 def test_a_torque_limit_hides_no_lag(begin: int) -> None:
-    """From line 430 on the record begins at the limit, with what the integrator held there."""
+    """From line 430 on the record begins at the limit, with what the integrator stored there."""
     limited = ga.PI(PI.kp, PI.ki, torque_limit=0.6)
     rec = record(LAG, pi=limited)
     whole = limited.torque_of(rec)

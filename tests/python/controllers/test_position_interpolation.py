@@ -135,7 +135,7 @@ def test_the_way_of_a_command_is_a_setting() -> None:
         ga.Cascade(ga.PI(0.3, 15.0), T, interpolation="cubic")
 
 
-def test_what_the_integrator_held_is_known_best_where_its_error_has_not_added_up() -> None:
+def test_what_the_integrator_stored_is_known_best_where_its_error_has_not_added_up() -> None:
     rng = np.random.default_rng(3)
     walk, noise = np.cumsum(1e-3 * rng.standard_normal(5000)), 0.01 * rng.standard_normal(5000)
     assert _first_level(1.2 + walk + noise) == pytest.approx(1.2, abs=0.01)

@@ -1,4 +1,4 @@
-"""Controllers of servo axes, held against a simulation that shares no code with the library (servo_referee.py)."""
+"""Controllers of servo axes, compared with a simulation that shares no code with the library (servo_referee.py)."""
 
 from __future__ import annotations
 

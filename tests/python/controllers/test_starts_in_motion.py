@@ -1,4 +1,4 @@
-"""Logs slower than their controller that start in motion: what controller and plant held before is not known."""
+"""Logs slower than their controller that start in motion: the state of controller and plant before is not known."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Records that begin under a load that the integrator held before, as on a vertical axis: any controller, any clock."""
+"""Records that begin under a load that the integrator stored before, as on a vertical axis: any controller, any clock."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ def case(loop: str, every: int, load: float = LOAD) -> tuple[ga.Record, ga.Casca
 
 @pytest.mark.parametrize("every", [1, 4])
 @pytest.mark.parametrize("loop", LOOPS)
-def test_what_the_integrator_held_is_read_from_the_torque(loop: str, every: int) -> None:
+def test_what_the_integrator_stored_is_read_from_the_torque(loop: str, every: int) -> None:
     rec, cascade = case(loop, every)
     driven = driven_by(rec, cascade) if every > 1 else rec
     assert stored_torque(driven, cascade) == pytest.approx(LOAD, rel=0.03)

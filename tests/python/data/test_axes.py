@@ -50,15 +50,15 @@ ki = 4.0
 
 @pytest.fixture
 def records(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> dict[str, ga.Record]:
-    """machine.csv, with axis x (dry friction, in rpm) and y (nothing hidden, in SI), and what it holds."""
+    """machine.csv, with axis x (dry friction, in rpm) and y (nothing hidden, in SI), and what it contains."""
     monkeypatch.chdir(tmp_path)
-    held = {"x": rig(X, STEPS, {"coulomb_friction": {"torque": 0.05}}), "y": rig(Y, -STEPS, seed=1)}
-    x, y = held.values()
+    axes = {"x": rig(X, STEPS, {"coulomb_friction": {"torque": 0.05}}), "y": rig(Y, -STEPS, seed=1)}
+    x, y = axes.values()
     rows = np.column_stack([x.time, x.command / RPM, x.velocity / RPM, x.torque, y.command, y.velocity, y.torque])
     header = "t,a1.set,a1.act,a1.M,a2.set,a2.act,a2.M"
     np.savetxt("machine.csv", rows, delimiter=",", header=header, comments="", fmt="%.14g")
     Path("drive.toml").write_text(DRIVE)
-    return held
+    return axes
 
 
 def test_read_axes(records: dict[str, ga.Record]) -> None:
@@ -97,7 +97,7 @@ def test_a_drive_file_of_several_axes(records: dict[str, ga.Record]) -> None:
     assert x["columns"] == {"time": "t", **COLUMNS["a1"]} and x["controller"] == {"kp": 0.03, "ki": 1.9}
     assert y["units"] == {"velocity": "m/s", "command": "m/s"} and y["controller"] == {"kp": 0.08, "ki": 4.0}
     assert (x[""], y[""]) == ({}, {"axis": "linear"})
-    with pytest.raises(ReadError, match="holds the axes x, y: say which with --select NAME"):
+    with pytest.raises(ReadError, match="contains the axes x, y: say which with --select NAME"):
         read_drive_file("drive.toml")
     with pytest.raises(ReadError, match="the axis is 'z': it must be one of x, y"):
         read_drive_file("drive.toml", "z")

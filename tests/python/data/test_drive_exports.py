@@ -142,8 +142,8 @@ def test_init_asks_what_a_sinumerik_trace_does_not_say(tmp_path: Path, monkeypat
     ("more", "words"),
     [
         ({"drop_outs": 3}, r"3 points of the trace were lost"),
-        ({"frames": 2}, r"holds several recordings"),
-        ({"root": "configuration"}, r"holds <configuration>, no trace of SINUMERIK"),
+        ({"frames": 2}, r"contains several recordings"),
+        ({"root": "configuration"}, r"contains <configuration>, no trace of SINUMERIK"),
     ],
 )
 def test_another_xml_file_is_refused(tmp_path: Path, more: dict[str, object], words: str) -> None:
@@ -157,7 +157,7 @@ def test_another_xml_file_is_refused(tmp_path: Path, more: dict[str, object], wo
         ('interval="0.000500" id="f1"', 'interval="0" id="f1"', "has the interval 0 s"),
         ('<rec time="0.0', '<rec time="zero', "the time of a record is 'zero"),
         ("</traceData>", "", "not a whole XML file"),
-        ("<rec ", "<record ", "holds no records"),
+        ("<rec ", "<record ", "contains no records"),
     ],
 )
 def test_a_damaged_trace_is_refused(tmp_path: Path, old: str, new: str, words: str) -> None:

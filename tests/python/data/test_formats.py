@@ -93,7 +93,7 @@ def test_a_pause_of_the_logger_is_not_bridged(tmp_path: Path) -> None:
     assert "resample" not in str(caught.value)
     with pytest.raises(ReadError, match=r"gap of 0\.501 s, from 0\.099 to 0\.6 s, where.* 0\.001 s.*split the log there"):
         read(tmp_path / "pause.npz", resample=1e-3)
-    # What only one channel holds is not used, and no pause of it matters.
+    # What only one channel contains is not used, and no pause of it matters.
     early = {"v": (np.arange(100) * 1e-3, np.ones(100)), "r": (np.append(-5.0, np.arange(100) * 1e-3), np.ones(101))}
     assert len(resampled("log", early, 1e-3)["r"]) == 100
     lost = np.delete(np.arange(200), [50, 51, 120]) * 1e-3  # a few lost samples are
@@ -187,8 +187,8 @@ def test_formats_of_other_libraries(
     without_name = tmp_path / "log.bin"  # known by its content alone
     path.rename(without_name)
     check(read(without_name, columns=columns))
-    held = read_columns(without_name)
-    assert any(key.endswith("w") for key in held) and not any(key.endswith(("note", "word", "state")) for key in held)
+    columns = read_columns(without_name)
+    assert any(key.endswith("w") for key in columns) and not any(key.endswith(("note", "word", "state")) for key in columns)
     damaged = tmp_path / f"damaged{Path(file).suffix}"
     damaged.write_bytes(without_name.read_bytes()[: without_name.stat().st_size // 3])
     with pytest.raises(ReadError, match=r"damaged\."):
@@ -348,7 +348,7 @@ def test_flaws_of_a_long_log_bear_their_line(long_log: Path, tmp_path: Path, mon
     monkeypatch.setattr(delimited, "WHOLE", 1 << 10)
     lines = long_log.read_text().splitlines()[:20_001]
     for row, text, words in (
-        (15_000, "x,1,2,3,4", "line 15001: time column 't .s.' holds 'x'"),
+        (15_000, "x,1,2,3,4", "line 15001: time column 't .s.' contains 'x'"),
         (15_000, "1.5,1,2,3,4", r"line 15001: time column .* irregular: from 1\.4998 to 1\.5 it jumps by 0\.0002"),
         (8_193, "1,2", "line 8194: 2 fields where the other lines have 5"),
         (9_000, "0.8999,1,\x01,3,4", "line 9001: this is no text"),
@@ -422,6 +422,6 @@ def test_a_header_that_does_not_fit_the_rows_is_named(
 ) -> None:
     (tmp_path / "log.csv").write_text(header + "\n" + "".join(f"{k},{k * k},{k % 3}\n" for k in range(30)))
     with pytest.raises(
-        ReadError, match=f"the header has {names} names, the rows have 3 cells, so the file holds '#0', '#1', '#2'"
+        ReadError, match=f"the header has {names} names, the rows have 3 cells, so the file contains '#0', '#1', '#2'"
     ):
         read(tmp_path / "log.csv", columns, dt=1e-3)

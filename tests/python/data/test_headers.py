@@ -102,7 +102,7 @@ def test_the_sample_holds_hundreds_of_headers() -> None:
 
 
 def looked_at(header: str, is_time: bool, folder: Path) -> tuple[ColumnInfo, Guess]:
-    """The column of a log that holds it alone, beside a time, and what is taken for what."""
+    """The column of a log that contains it alone, beside a time, and what is taken for what."""
     head = f"{header};a" if is_time else f"Time [s];{header}"
     rows = "".join(f"{k};{np.sin(k):.4f}\n" for k in range(30))
     (folder / "log.csv").write_text(f"{head}\n{rows}", encoding="utf-8")

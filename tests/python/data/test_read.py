@@ -35,9 +35,9 @@ def test_the_same_run_in_every_loggers_manner(file: str, call: dict[str, Any]) -
 
 
 def test_read_columns_says_what_the_file_holds() -> None:
-    held = read_columns(SAMPLES / "pairs.csv")
-    assert list(held) == ["Time #0", "Speed", "Time #2", "Current"]
-    np.testing.assert_allclose(held["Time #0"], np.arange(40) * 0.5e-3)
+    columns = read_columns(SAMPLES / "pairs.csv")
+    assert list(columns) == ["Time #0", "Speed", "Time #2", "Current"]
+    np.testing.assert_allclose(columns["Time #0"], np.arange(40) * 0.5e-3)
     text = read_columns(str(SAMPLES / "status_text.csv"))
     assert list(text) == ["date", "t", "state", "velocity", "torque"]
     assert np.isnan(text["state"]).all()
@@ -173,8 +173,8 @@ def test_arrays_of_every_shape(tmp_path: Path, kind: str) -> None:
         rec = read(path, columns={"time": "row", "velocity": address, "torque": "data[:,2]"})
         assert rec.dt == pytest.approx(1e-3)
         np.testing.assert_array_equal(rec.velocity, expected)
-    held = read_columns(path)
-    assert set(held) == {
+    columns = read_columns(path)
+    assert set(columns) == {
         "row",
         "column",
         "flat",
@@ -185,7 +185,7 @@ def test_arrays_of_every_shape(tmp_path: Path, kind: str) -> None:
         "wide[1,:]",
         "gain",
     }
-    assert all(values.dtype == np.float64 and values.ndim == 1 for values in held.values())
+    assert all(values.dtype == np.float64 and values.ndim == 1 for values in columns.values())
     with pytest.raises(ReadError, match=r"a\.\w+: velocity='data' is an array of 30 x 3.*'data\[:,0\]'.*zero based"):
         read(path, columns={"velocity": "data", "torque": "flat"}, dt=1.0)
     with pytest.raises(ReadError, match=r"velocity='data\[:,3\]'.*from 0 to 2"):
@@ -288,7 +288,7 @@ def test_a_long_clean_log_is_read_fast_and_a_flaw_in_it_found(tmp_path: Path) ->
     # about 0.5 s here; a million lines in a few seconds
     assert time.process_time() - start < 4.0
     lines[150_000] = lines[150_000].replace(",25", ",2?")
-    with pytest.raises(ReadError, match=r"line 150002: torque column 'torque' holds '\d+,2\?'"):
+    with pytest.raises(ReadError, match=r"line 150002: torque column 'torque' contains '\d+,2\?'"):
         read(write(path, "t;velocity;torque", lines))
 
 
@@ -343,11 +343,11 @@ def test_real_emps(data_dir: Path, file: str) -> None:
     assert len(rec) == 24841
     assert rec.dt == pytest.approx(1e-3, rel=1e-6)
     assert 0.1 < np.abs(rec.velocity).max() < 0.2
-    held = read_columns(real(data_dir, "emps", file))
-    assert held["gtau"][0] == 35.15065188248547
+    columns = read_columns(real(data_dir, "emps", file))
+    assert columns["gtau"][0] == 35.15065188248547
     if "PULSES" in file:
-        assert held["pulses_N"].dtype == np.float64
-        assert held["pulses_N"].max() > 0
+        assert columns["pulses_N"].dtype == np.float64
+        assert columns["pulses_N"].max() > 0
 
 
 @pytest.mark.parametrize("run", ["0.065_1", "0.065_2", "0.065_3", "0.06_1", "0.06_2", "0.06_3"])

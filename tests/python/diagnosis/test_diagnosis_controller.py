@@ -85,7 +85,7 @@ def test_a_replay_is_made_once_for_a_record_and_kept_no_longer_than_it() -> None
     assert gone() is None
 
 
-def test_a_log_that_follows_from_the_recorded_velocity_is_not_held_against_the_cleaned_one() -> None:
+def test_a_log_that_follows_from_the_recorded_velocity_is_not_compared_with_the_cleaned_one() -> None:
     """Glitches of the sensor that the controller read are left out of the fit, not out of the replay."""
     asked = drive_record().command
     assert asked is not None

@@ -369,7 +369,7 @@ def test_an_axis_at_rest_shows_no_friction_of_the_family_and_no_order_up_to_the_
     highest = {t.orders[1] for t in terms.LIBRARY.values() if t.harmonic and t.orders[1] > 1}
     assert highest == {HIGHEST_ORDER}
     t = DT * np.arange(2000)
-    for share, shown in ((0.99, False), (1.01, True)):  # of the travel that holds one period of the highest order
+    for share, shown in ((0.99, False), (1.01, True)):  # of the travel that contains one period of the highest order
         angle = 0.5 * share * math.tau / HIGHEST_ORDER * np.sin(20.0 * t)
         rec = ga.Record(DT, velocity=np.gradient(angle, DT), torque=np.cos(20.0 * t), position=angle)
         assert ("cogging" not in excitation(rec).not_testable) is shown

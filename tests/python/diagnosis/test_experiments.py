@@ -142,12 +142,10 @@ def test_limits_of_records_are_what_the_records_did() -> None:
         Limits.of(ga.Record(DT, 0.0 * command, 0.0 * command), ga.PI(**GAINS))
 
 
-def test_without_a_torque_a_load_that_was_held_before_does_not_show() -> None:
+def test_without_a_torque_a_load_that_was_stored_before_does_not_show() -> None:
     w = 20.0 * np.sin(0.02 * np.arange(600))
     loop = ga.PI(**GAINS)
     said = excitation(ga.Record(DT, command=w, velocity=w), loop).one_sided["load_torque"]
-    assert (
-        said == "no torque is logged: a load that the controller's integrator held when the record began shows in no other signal"
-    )
+    assert said == "no torque is logged: a load that the integrator stored when the record began shows in no other signal"
     assert "load_torque" not in excitation(ga.Record(DT, command=w, velocity=w, torque=w), loop).one_sided
     assert "load_torque" not in excitation(ga.Record(DT, command=w, velocity=w), ga.PI(kp=0.02, ki=0.0)).one_sided

@@ -289,7 +289,7 @@ def test_a_cause_that_whitening_hid_is_one_by_the_errors_before_whitening(plain:
     space, without, other = bench.space, bench.fit(B), bench.fit(A)
     assert space.hidden(without, other) and not space.hidden(other, without)
     assert not space.hidden(other, other), "the same causes hide nothing"
-    assert not space.hidden(bench.fit(A, B), other), "nor does a model that holds them all"
+    assert not space.hidden(bench.fit(A, B), other), "nor does a model that contains them all"
     # Most of what is left without it has to be its work.
     little = Bench({"a": (0.3,)}, extra=0.7 * np.sin(70.0 * S**2), plain=plain, noise=0.01)
     assert not little.space.hidden(little.fit(B), little.fit(A))
@@ -786,7 +786,7 @@ def test_what_is_followed_up_is_the_same_however_finely_a_record_is_sampled(monk
     for times in (4, 10):
         found, same = followed_up(monkeypatch, times, plain)
         assert same == best, times
-        # Output errors hold the same evidence; whitened ones with the noise of more samples hold more, which drops nothing.
+        # Output errors contain the same evidence; whitened ones with the noise of more samples contain more, which drops nothing.
         assert sorted(found) == sorted(first) if plain else set(found) >= set(first), times
 
 

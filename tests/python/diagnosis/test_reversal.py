@@ -51,8 +51,8 @@ def test_one_direction_shows_no_jump() -> None:
     assert jump_at_reversal([ga.Record(1e-3, velocity=w, command=w)]) is None
 
 
-@pytest.mark.parametrize(("effects", "held"), [({"coulomb_friction": {"torque": 0.4}}, 0.4), ({}, None)])
-def test_a_torque_that_changes_at_rest_is_held_by_dry_friction(effects: Effects, held: float | None) -> None:
+@pytest.mark.parametrize(("effects", "level"), [({"coulomb_friction": {"torque": 0.4}}, 0.4), ({}, None)])
+def test_a_torque_that_changes_at_rest_is_held_by_dry_friction(effects: Effects, level: float | None) -> None:
     """A torque from -0.39 to 0.39 N m does not move the axis; without friction it does."""
     plant = Plant(J=0.02, D=0.04, kp=0.0, ki=0.0, dt=1e-3)
     torque = np.concatenate([np.linspace(0.0, -0.39, 1000), np.linspace(-0.39, 0.39, 4000), np.full(1500, 0.9)])
@@ -60,10 +60,10 @@ def test_a_torque_that_changes_at_rest_is_held_by_dry_friction(effects: Effects,
     noise = 1e-3 * np.random.default_rng(1).standard_normal((2, len(torque)))
     rec = ga.Record(1e-3, velocity=log.velocity + noise[0], torque=torque + noise[1])
     found = torque_held_at_rest([rec])
-    if held is None:
+    if level is None:
         assert found is None or found.value < 0.05
     else:
-        assert found is not None and 0.9 * held < found.value < held and found.std < 0.01 * held
+        assert found is not None and 0.9 * level < found.value < level and found.std < 0.01 * level
 
 
 def test_a_filtered_velocity_is_late_behind_the_position_and_a_plain_one_is_not() -> None:

@@ -210,8 +210,8 @@ def test_beside_numbers_that_are_fitted_too_the_other_age_moves_all_of_them(reco
     move = refined(objective, best, best.predictor.data.aged(0.5)).x - best.x
     part = of_controller(objective, best) - of_controller(objective, alone(best))
     np.testing.assert_allclose(part, np.outer(move, move))
-    held = fitted(objective, best.hypothesis.over(best.predictor.data.aged(0.5)), best.x, WHITE, 12).x - best.x
-    assert np.abs(held - move).max() > 0.1 * np.abs(move).max(), "under the numbers of the first age it would be another"
+    moved = fitted(objective, best.hypothesis.over(best.predictor.data.aged(0.5)), best.x, WHITE, 12).x - best.x
+    assert np.abs(moved - move).max() > 0.1 * np.abs(move).max(), "under the numbers of the first age it would be another"
 
 
 def test_an_age_that_leaves_clearly_more_is_excluded_where_the_torque_follows_from_its_controller() -> None:

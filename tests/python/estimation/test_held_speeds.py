@@ -1,4 +1,4 @@
-"""Speeds that are only held hold no acceleration beyond its noise: they show friction all the same."""
+"""Speeds that are only held contain no acceleration beyond its noise: they show friction all the same."""
 
 from __future__ import annotations
 

@@ -21,7 +21,7 @@ def noisy(record: ga.Record, share: float, seed: int) -> ga.Record:
 
 
 def test_torque_noise_of_a_drive_without_effects_is_no_cause() -> None:
-    """A stiff shaft, which the noise lets swing: 3500 samples held the information of 440, and cogging seemed to be there."""
+    """A stiff shaft, which the noise lets swing: 3500 samples had the information of 440, and cogging seemed to be there."""
     record, validation, _, truth = random_case(211000000, (), "multi", "white")
     assert validation is not None and truth.plant.two_masses
     dia = ga.diagnose(noisy(record, 0.05, 0), validation=noisy(validation, 0.05, 1))
@@ -43,7 +43,7 @@ def test_friction_beside_torque_noise_is_explained() -> None:
 
 
 @pytest.mark.parametrize("damping", [0.02, 0.1])
-def test_errors_that_swing_hold_little_information(damping: float) -> None:
+def test_errors_that_swing_contain_little_information(damping: float) -> None:
     """An autoregression of order 2 that rings: the mean square varies by sqrt(2/I), which 400 draws measure."""
     omega, count = 0.27, 2000
     pole = np.exp(complex(-damping * omega, omega * np.sqrt(1.0 - damping**2)))

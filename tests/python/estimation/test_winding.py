@@ -65,11 +65,11 @@ COLUMNS = {"time": "t", "velocity": "n"}
 
 @pytest.mark.parametrize("inductance", [0.0, L])
 def test_the_current_of_a_known_winding(inductance: float) -> None:
-    held = motor(inductance=inductance)
+    run = motor(inductance=inductance)
     winding = ga.Winding(R, KT, inductance)
-    current = winding.current(held["voltage"], held["velocity"], DT)
-    off = np.abs(current - held["current"])[1:]  # the rig's current begins at 0
-    assert float(off[10:].max()) < 0.01 * float(np.abs(held["current"]).max())
+    current = winding.current(run["voltage"], run["velocity"], DT)
+    off = np.abs(current - run["current"])[1:]  # the rig's current begins at 0
+    assert float(off[10:].max()) < 0.01 * float(np.abs(run["current"]).max())
     # The torque is the mean over each sample: what accelerates the mass beside its friction.
     torque = motor(friction=0.0, inductance=inductance)
     mean = ga.Winding(R, KT, inductance).torque(torque["voltage"], torque["velocity"], DT)
@@ -78,7 +78,7 @@ def test_the_current_of_a_known_winding(inductance: float) -> None:
     assert float(np.abs(mean[:-1] - needed)[10:].max()) < 0.01 * float(np.abs(needed).max())
     # A back-EMF constant of its own, as dq coordinates have it.
     other = ga.Winding(R, 1.5 * KT, inductance, back_emf_constant=KE)
-    np.testing.assert_allclose(other.current(held["voltage"], held["velocity"], DT), current)
+    np.testing.assert_allclose(other.current(run["voltage"], run["velocity"], DT), current)
     assert other.emf == KE and winding.emf == KT
 
 

@@ -151,8 +151,8 @@ def test_the_rig_with_friction_converges_and_agrees_with_the_core(
 
 def test_friction_sticks_and_noise_is_read_by_the_controller() -> None:
     rig = Rig(ONE_MASS.sheet, ga.PI(0.0232, 0.0), DT, Friction(0.05, 0.08, 5.0), 0.0)
-    held = rig.record(np.full(50, 3.0), 0)  # 0.07 N m: below what it takes to break away
-    assert not held.velocity.any()
+    resting = rig.record(np.full(50, 3.0), 0)  # 0.07 N m: below what it takes to break away
+    assert not resting.velocity.any()
     turning = rig.record(np.full(500, 4.0), 0).velocity[-1]
     level = float(rig.friction.level(np.array(turning)))
     assert turning > 0.4 and 0.0232 * (4.0 - turning) == pytest.approx(0.003 * turning + level, rel=1e-3)

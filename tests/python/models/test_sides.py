@@ -122,14 +122,14 @@ def test_simulate_values_take_effects_at_the_load_by_their_key() -> None:
 
 
 def test_gravity_at_the_load_has_the_load_s_angle() -> None:
-    """At rest on a soft shaft the load hangs deeper than the motor: A sin(theta - x) = K x, with the motor held by friction."""
+    """At rest on a soft shaft the load hangs deeper than the motor: A sin(theta - x) = K x, the motor at rest by friction."""
     soft = ga.TwoMass(1e-4, 0.002, 5e-4, 0.02, 0.3, 0.002)
     amplitude, start = 0.1, 0.8
     model = soft.model().with_effect("unbalance", side="load", amplitude=amplitude, phase=0.0)
     model = model.with_effect("coulomb_friction", torque=10.0)
     n = 3000
-    held = ga.Record(1e-3, torque=np.zeros(n), velocity=np.zeros(n), position=np.full(n, start))
-    assert np.array_equal(ga.simulate(model, held), np.zeros(n))
+    rec = ga.Record(1e-3, torque=np.zeros(n), velocity=np.zeros(n), position=np.full(n, start))
+    assert np.array_equal(ga.simulate(model, rec), np.zeros(n))
     # Without friction the motor follows: both end below, where sin is 0, at an angle of 0.
     free = soft.model().with_effect("unbalance", side="load", amplitude=amplitude, phase=start)
     end = ga.run(free, ga.Record(1e-3, torque=np.zeros(n), velocity=np.zeros(n))).position[-1]

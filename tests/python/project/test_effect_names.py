@@ -87,7 +87,7 @@ def test_only_the_library_names_effects() -> None:
 
 
 def test_the_library_offers_no_single_effect() -> None:
-    """No module of it has a name for one; rows are in tuples, and other rooms import no module that holds rows."""
+    """No module of it has a name for one; rows are in tuples, and other rooms import no module that contains rows."""
     rows = {place.__name__ for place in terms.PLACES}
     for found in pkgutil.iter_modules(library.__path__, library.__name__ + "."):
         module = importlib.import_module(found.name)

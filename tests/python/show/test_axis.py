@@ -105,9 +105,9 @@ def test_a_sentence_is_copied_and_saved_with_both_its_forms() -> None:
     text = say("{torque}")
     for same in (copy.deepcopy(text), copy.copy(text), pickle.loads(pickle.dumps(text))):
         assert isinstance(same, Text) and (same, same.linear) == ("torque", "force")
-    held = linear_sentences([text, "plain", Text("alike")])
-    assert held == {"torque": "force"}
-    assert said(restored("torque", held), "linear") == "force" and said(restored("old", held), "linear") == "old"
+    linear = linear_sentences([text, "plain", Text("alike")])
+    assert linear == {"torque": "force"}
+    assert said(restored("torque", linear), "linear") == "force" and said(restored("old", linear), "linear") == "old"
 
 
 def test_units_and_words_of_both() -> None:
@@ -347,8 +347,8 @@ def test_a_saved_result_is_read_with_the_words_of_both(results: tuple[ga.Diagnos
 
 def test_a_saved_result_of_before_keeps_its_sentences(results: tuple[ga.Diagnosis, ga.Identification]) -> None:
     data = results[0].to_dict()
-    for held in (data, data["identification"], data["next_experiment"]):
-        del held["linear_axis"]
+    for linear in (data, data["identification"], data["next_experiment"]):
+        del linear["linear_axis"]
     for finding in data["findings"]:
         del finding["place"]  # read back as that of the effect
     old = ga.Diagnosis.from_dict(data)

@@ -66,7 +66,7 @@ def test_an_order_line_stands_at_its_order_with_its_amplitude() -> None:
     for seed in range(5):
         noise = np.random.default_rng(seed).standard_normal(N)
         assert order_lines(position, noise, velocity).peaks == []
-    # Coloured noise over little more than a turn: a level that falls with it, no order that the travel does not hold.
+    # Coloured noise over little more than a turn: a level that falls with it, no order that the travel does not contain.
     for seed in range(5):
         short = position[: int(1.3 * math.tau / 30.0 / DT)]
         coloured = 1e-5 * np.cumsum(np.random.default_rng(seed).standard_normal(len(short)))

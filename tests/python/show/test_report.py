@@ -1,4 +1,4 @@
-"""The report as a text: what it holds, that nothing from a file gets out of its place, what is said where data are missing."""
+"""The report as a text: what it contains, that nothing from a file gets out of its place, what is said where data are missing."""
 
 from __future__ import annotations
 

@@ -142,8 +142,8 @@ def test_tables(diagnosis: ga.Diagnosis, monkeypatch: pytest.MonkeyPatch) -> Non
     row = table.loc[("mechanics", "J")]
     assert (row["value"], row["std"], row["unit"]) == (idn.mechanics.J, idn.mechanics.std["J"], "kg m^2")
     assert not table["at_bound"].any()
-    held = replace(idn, parameters={**idn.parameters, "gain": replace(gain, at_bound=True)})
-    assert held.to_pandas().loc["mechanics", "at_bound"].all()  # what follows from a bound is no better
+    bounded = replace(idn, parameters={**idn.parameters, "gain": replace(gain, at_bound=True)})
+    assert bounded.to_pandas().loc["mechanics", "at_bound"].all()  # what follows from a bound is no better
     finding = diagnosis.causes[0]
     torque = replace(finding.parameters["torque"], of_controller=0.5 * finding.parameters["torque"].std)
     finding = replace(finding, parameters={**finding.parameters, "torque": torque})

@@ -100,13 +100,13 @@ class Browser:
         self.ask("Emulation.setEmulatedMedia", features=[{"name": "prefers-color-scheme", "value": scheme}])
 
     def drag(self, x0: float, y0: float, x1: float, y1: float) -> None:
-        """With the left button held, in pixels of the window."""
+        """With the left button down, in pixels of the window."""
         steps = [("mouseMoved", x0, y0), ("mousePressed", x0, y0), ("mouseMoved", (x0 + x1) / 2, (y0 + y1) / 2),
                  ("mouseMoved", x1, y1), ("mouseReleased", x1, y1)]  # fmt: skip
         for kind, x, y in steps:
-            held = kind != "mouseMoved" or (x, y) != (x0, y0)
-            self.ask("Input.dispatchMouseEvent", type=kind, x=x, y=y, clickCount=1, buttons=int(held),
-                     button="left" if held else "none")  # fmt: skip
+            down = kind != "mouseMoved" or (x, y) != (x0, y0)
+            self.ask("Input.dispatchMouseEvent", type=kind, x=x, y=y, clickCount=1, buttons=int(down),
+                     button="left" if down else "none")  # fmt: skip
 
     def downloads_to(self, folder: Path) -> None:
         self.ask("Browser.setDownloadBehavior", session=None, behavior="allow", downloadPath=str(folder))

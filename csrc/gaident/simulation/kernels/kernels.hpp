@@ -56,7 +56,7 @@ struct KernelSet {
     void (*alone)(AloneRun<T>&, const double* input, std::size_t n, double* velocity, double* torque);
 };
 
-// The same with the controller's limits, the group holding plants and not closed loops; and with two inputs.
+// The same with the controller's limits, the group of plants and not closed loops; and with two inputs.
 struct SteppedKernelSet : KernelSet<DoubleGroup, double> {
     void (*stepped_errors)(DoubleGroup&, const ControllerState<double>&, const double* input, const double* output, std::size_t n,
                            double* sums);

@@ -16,7 +16,7 @@ struct ProductSource {
 
     // sums[i][j] += sum_k a[k][i] b[k][j]
     static void gram(const double* a, const double* b, std::size_t n, double* sums) {
-        // As many rows of sums at a time as the registers hold.
+        // As many rows of sums at a time as the registers take.
         constexpr int T = L::registers == 1 ? 8 : L::registers == 2 ? 4 : 2;
         for (int i = 0; i < W; i += T) {
             L part[T];

@@ -107,7 +107,7 @@ def _diagnosed(args: Namespace) -> tuple[Drive, Diagnosis, list[Path]]:
         if args.model is not None:
             loaded = load(args.model)
             if not isinstance(loaded, Identification):
-                raise SettingsError(f"--model {args.model} holds no identification: give what gaident identify --out saved")
+                raise SettingsError(f"--model {args.model} contains no identification: give what gaident identify --out saved")
             idn = loaded
         bar.doing("looking at the records")
         if idn is None:

@@ -30,7 +30,7 @@ def export_command(args: argparse.Namespace) -> None:
     """`gaident export RESULT.json --to FORM`."""
     result = load(args.result)
     if not isinstance(result, (Diagnosis, Identification)):
-        raise SettingsError(f"{args.result} holds a record, no model: give what gaident identify or diagnose wrote with --out")
+        raise SettingsError(f"{args.result} contains a record, no model: give what gaident identify or diagnose wrote with --out")
     path = args.out or str(Path(args.result).with_suffix(FORMS[args.to]).name)
     target = target_of(path, [args.result])
     assert target is not None

@@ -22,7 +22,7 @@ from gaident.errors import ReadError
 __all__ = ["WHOLE", "TextOptions", "open_text"]
 
 WHOLE = 1 << 25  # no decision: memory; bytes
-"""Bytes of a text that is held in memory as it is; longer ones are read block by block."""
+"""Bytes of a text that is kept in memory as it is; longer ones are read block by block."""
 
 _HEAD = 1 << 18  # no decision: memory; bytes
 _WORDS = {"tab": "\t", "space": " ", "comma": ",", "semicolon": ";", "pipe": "|", "\\t": "\t"}
@@ -152,7 +152,7 @@ def _layout(path: str, everything: Sequence[str], options: TextOptions) -> tuple
 
 
 def _filled(lines: Iterable[Line]) -> Iterator[Line]:
-    """Those that hold something; the mark of the end is nothing."""
+    """Those that contain something; the mark of the end is nothing."""
     return ((number, text) for number, text in lines if text and not text.isspace() and text != END_MARK)
 
 

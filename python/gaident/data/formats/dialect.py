@@ -33,8 +33,8 @@ class Dialect:
 
     delimiter  between columns; ' ' stands for any run of white space
     decimal    "." or ","
-    numeric    whether column k holds numbers
-    empty      whether the last column holds nothing at all
+    numeric    whether column k contains numbers
+    empty      whether the last column contains nothing at all
     ragged     whether rows may end early, where the columns at the right have no more values
     """
 

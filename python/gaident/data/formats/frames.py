@@ -25,7 +25,7 @@ def open_parquet(path: str, file: Path, stack: ExitStack) -> LogTable:
     """Numeric columns of a Parquet file, read block by block; a field's metadata `unit` or `units` is its unit."""
     parquet = library("pyarrow.parquet", "parquet", path, "a Parquet file")
     try:
-        # Its defaults hold whole row groups, which may be the whole file, before the first row is given out.
+        # Its defaults contain whole row groups, which may be the whole file, before the first row is given out.
         opened = stack.enter_context(parquet.ParquetFile(file, pre_buffer=False, buffer_size=_BUFFER))
         fields = list(opened.schema_arrow)
     except Exception as error:  # pyarrow's errors share no class
@@ -44,7 +44,7 @@ def open_parquet(path: str, file: Path, stack: ExitStack) -> LogTable:
         stated = next((metadata[key].decode("utf-8", "replace") for key in (b"units", b"unit") if key in metadata), None)
         columns.append(Column(field.name, np.zeros(0), (), "s" if kind in "Mm" else stated or unit_of(field.name)))
     if not columns:
-        raise ReadError(f"{path}: the file holds no columns of numbers (only {', '.join(others)})")
+        raise ReadError(f"{path}: the file contains no columns of numbers (only {', '.join(others)})")
 
     origins: dict[str, Any] = {}  # midnight of each column of dates
 

@@ -80,13 +80,13 @@ def find_header(lines: Sequence[Line], comments: Sequence[Line], dialect: Dialec
 
 
 def _unused(above: Sequence[Line], dialect: Dialect) -> int:
-    """How many names the last line above the numbers holds; 0 where it is no line of names."""
+    """How many names the last line above the numbers contains; 0 where it is no line of names."""
     cells = split(above[-1][1], dialect.delimiter) if above else []
     return len(cells) if len(cells) > 1 and all(cells) and not _has_number(cells, dialect) else 0
 
 
 def _first_data(lines: Sequence[Line], dialect: Dialect) -> int:
-    """Position of the first line whose columns of numbers hold numbers, at least one, or nothing."""
+    """Position of the first line whose columns of numbers contain numbers, at least one, or nothing."""
     for index, (_, text) in enumerate(lines):
         cells = split(text, dialect.delimiter)
         if len(cells) != dialect.width:
@@ -190,7 +190,7 @@ def _bare_unit(cell: str) -> str | None:
 def _split_unit(cell: str) -> tuple[str, str | None]:
     """`w [rpm]`, `w (rpm)`, `w / rpm`, `n in rpm` -> (w, rpm).
 
-    Square brackets always hold a unit, unless a number (`w[0]`); what else is enclosed counts if it is a
+    Square brackets always contain a unit, unless a number (`w[0]`); what else is enclosed counts if it is a
     known unit. Of the others `name_and_unit` knows those that end a name: speed_rpm.
     """
     for pattern in (_BRACKETS, _NOTED, _AFTER):

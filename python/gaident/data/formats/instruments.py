@@ -141,5 +141,5 @@ def _mdf_reader(mdf: Any, group: int, index: int, is_master: bool) -> Any:
 def _table(path: str, columns: list[Column], others: list[str], form: str) -> LogTable:
     if not columns:
         rest = f" (only {', '.join(others)})" if others else ""
-        raise ReadError(f"{path}: the file holds no channels of numbers{rest}; give a log with measured channels")
+        raise ReadError(f"{path}: the file contains no channels of numbers{rest}; give a log with measured channels")
     return LogTable(path, tuple(columns), others=tuple(others), form=form)

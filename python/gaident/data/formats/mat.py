@@ -156,7 +156,7 @@ def _fields(parts: _Elements, order: str, name: str, depth: int) -> list[Variabl
 
 def _shaped(name: str, values: NDArray[Any], shape: tuple[int, ...]) -> NDArray[Any]:
     if values.size != math.prod(shape):
-        raise DamagedError(f"{name!r} holds {values.size} numbers, but its shape is {shape}")
+        raise DamagedError(f"{name!r} contains {values.size} numbers, but its shape is {shape}")
     return values.reshape(shape, order="F")
 
 

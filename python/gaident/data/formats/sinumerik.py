@@ -81,7 +81,7 @@ def open_sinumerik(path: str, file: Path, options: TextOptions, stack: ExitStack
 
 
 class _Trace:
-    """What a file holds, as its elements pass."""
+    """What a file contains, as its elements pass."""
 
     def __init__(self, path: str) -> None:
         self.path, self.root, self.frames = path, "", 0
@@ -91,10 +91,10 @@ class _Trace:
         if event == "start":
             self.root = self.root or element.tag
             if self.root != _ROOT:
-                raise ReadError(f"{self.path}: this XML file holds <{self.root}>, no trace of SINUMERIK; export the log as CSV")
+                raise ReadError(f"{self.path}: the XML file contains <{self.root}>, no trace of SINUMERIK; export the log as CSV")
             self.frames += element.tag == "dataFrame"
             if self.frames > 1:
-                raise ReadError(f"{self.path}: the file holds several recordings; save each in a file of its own")
+                raise ReadError(f"{self.path}: the file contains several recordings; save each in a file of its own")
             return
         if element.tag == "frameHeader" and _number(self.path, element.get("dropOuts", "0"), "dropOuts") != 0.0:
             lost = element.get("dropOuts")
@@ -115,7 +115,7 @@ class _Trace:
     def table(self) -> LogTable:
         written = [signal for signal in self.signals.values() if signal.times]
         if not written:
-            raise ReadError(f"{self.path}: the trace holds no records; record it again")
+            raise ReadError(f"{self.path}: the trace contains no records; record it again")
         clocks: dict[tuple[float, float, int], str] = {}
         columns = []
         for signal in written:

@@ -44,7 +44,7 @@ def array_table(
     """The table of named arrays, one- and two-dimensional. Raises ReadError where there are none."""
     if not arrays:
         rest = f" (only {', '.join(others)})" if others else ""
-        raise ReadError(f"{path}: the file holds no arrays of numbers{rest}; save the log's columns as plain vectors")
+        raise ReadError(f"{path}: the file contains no arrays of numbers{rest}; save the log's columns as plain vectors")
     columns: list[Column] = []
     matrices: dict[str, Any] = {}
     units = {name: unit for name in arrays if (unit := (units or {}).get(name) or unit_of(name)) is not None}

@@ -1,4 +1,4 @@
-"""What a log file holds, whatever its format: named columns, and where each value stands."""
+"""What a log file contains, whatever its format: named columns, and where each value stands."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from gaident.errors import ReadError
 __all__ = ["BLOCK", "Column", "Stored", "LogTable", "first_line"]
 
 BLOCK = 1 << 16  # no decision: memory; values of a block
-"""Rows that are held at once of a log that is read block by block."""
+"""Rows that are kept in memory at once, of a log that is read block by block."""
 
 _NUMBER_SIGN = re.compile(r"#\s*(\d+)")
 _PICK = re.compile(r"(.+)\[\s*(:|-?\d+)\s*,\s*(:|-?\d+)\s*\]")
@@ -52,7 +52,7 @@ class Stored:
             ) from None
         if values.shape != (stop - start,):
             raise ReadError(
-                f"{self.path}: damaged, it holds {values.size} values where {stop - start} are announced; copy it again"
+                f"{self.path}: damaged, it contains {values.size} values where {stop - start} are announced; copy it again"
             )
         return values
 
@@ -91,12 +91,12 @@ class LogTable:
     columns   in the order of the file
     lines     line number of each row, for text files; None where only an index makes sense
     matrices  two-dimensional arrays, addressed as `data[:,3]`, zero based
-    others    names of what the file holds besides, such as text, which cannot be a channel
+    others    names of what the file contains besides, such as text, which cannot be a channel
     first     index of the first row, where the table is a block of a longer one
     batches   of a file that is read row by row: the rows of the columns asked for, block by block; the columns of
-              the table itself then hold no values
+              the table itself then contain no values
     form      what the format is called
-    remark    why the columns have no names, where the file holds some; for messages about a missing column
+    remark    why the columns have no names, where the file contains some; for messages about a missing column
     """
 
     path: str
@@ -161,7 +161,9 @@ class LogTable:
         values = column.whole()
         if values.dtype.kind not in "iufb":
             raise ReadError.at(
-                self.path, f"{where} holds no real numbers (dtype {values.dtype})", "name another column, or save its real part"
+                self.path,
+                f"{where} contains no real numbers (dtype {values.dtype})",
+                "name another column, or save its real part",
             )
         bad = first_not_finite(values.astype(np.float64, copy=False))
         if column.bad is not None and (bad is None or column.bad[0] <= bad):
@@ -169,12 +171,14 @@ class LogTable:
             apart = f", or, where channels have times of their own, put them on one axis with {arg('resample')} [s]"
             raise ReadError.at(
                 f"{self.path}, {self.place(row)}",
-                f"{where} {'is empty' if not text else f'holds {text!r}, not a number'}{_comma_hint(text)}",
+                f"{where} {'is empty' if not text else f'contains {text!r}, not a number'}{_comma_hint(text)}",
                 f"correct or remove that {'line' if self.lines is not None else 'value'}{'' if text else apart}",
             )
         if bad is not None:
             raise ReadError.at(
-                f"{self.path}, {self.place(bad)}", f"{where} holds {values[bad]}", "cut the log before it, or correct the value"
+                f"{self.path}, {self.place(bad)}",
+                f"{where} contains {values[bad]}",
+                "cut the log before it, or correct the value",
             )
         return values.astype(np.float64, copy=False)
 
@@ -227,8 +231,8 @@ class LogTable:
         )
 
     def said(self) -> str:
-        """What the file holds, in words."""
-        return f"{f'{self.remark}, so ' if self.remark else ''}the file holds {self.listing()}"
+        """What the file contains, in words."""
+        return f"{f'{self.remark}, so ' if self.remark else ''}the file contains {self.listing()}"
 
     def _missing(self, wanted: str, channel: str) -> str:
         names = {name.casefold(): name for column in self.columns for name in (*column.names, column.key)}

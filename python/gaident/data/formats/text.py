@@ -45,7 +45,7 @@ def check_text(path: str, parts: Sequence[str], first: int = 1) -> None:
         if control is not None:
             line = first + above + text.count("\n", 0, control.start())
             raise ReadError(
-                f"{path}, line {line}: this is no text file (it holds the byte {ord(control[0]):#04x}), nor any other log "
+                f"{path}, line {line}: this is no text file (it contains the byte {ord(control[0]):#04x}), nor any other log "
                 "that read knows by its content; export the log as CSV, "
                 f"or give {arg('encoding')} if it is text of another encoding"
             )

@@ -85,7 +85,7 @@ def _from_objects(values: Sequence[Any], array: NDArray[Any], argument: str) -> 
     try:
         return array.astype(np.float64)
     except OverflowError:
-        raise RecordError(f"{argument} holds a whole number too large for a float64; scale it first") from None
+        raise RecordError(f"{argument} contains a whole number too large for a float64; scale it first") from None
 
 
 def first_not_finite(array: NDArray[np.float64]) -> int | None:

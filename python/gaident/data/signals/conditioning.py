@@ -1,4 +1,4 @@
-"""Preparing signals for a record: a velocity for logs that hold only a position."""
+"""Preparing signals for a record: a velocity for logs that contain only a position."""
 
 from __future__ import annotations
 

@@ -136,7 +136,7 @@ def refine(
     t = offset + (1.0 + rate) * own
     used = (t >= margin) & (t <= (len(x) - 1) * dt - margin)
     s, z = own[used], smooth[used]
-    if len(s) < 20:  # no decision: fewer hold no fit of four numbers
+    if len(s) < 20:  # no decision: fewer contain no fit of four numbers
         return None
     width = 2.0 * _half_width(smooth - smooth.mean()) * their_dt
     centre = float(s.mean())

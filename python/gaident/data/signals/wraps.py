@@ -5,7 +5,7 @@ alike and of the other sign: the motion goes on as if nothing had happened. The 
 
     M = |d| + |p|        p: mean of the steps before and after, in the direction of the motion
 
-to within the difference of the two; where that holds a usual range (2^8 .. 2^32, 1, 360, 2 pi, counts per turn, ...), it is that.
+to within the difference of the two; where it has a usual range (2^8 .. 2^32, 1, 360, 2 pi, counts per turn, ...), it is that.
 Where the steps beside it differ by more than half or are none, as of an encoder at low speed, a usual range alone is taken.
 A position is continued: x + k M, k the wraps so far. A glitch jumps back at once and is none; nor is a jump of a rotor that takes
 more than a quarter of M in a sample.

@@ -41,7 +41,7 @@ class Driving:
     doubts: notes on torques that do not follow from a controller that is no bare PI. numbers: those that were not given.
     limited: whether a limit of the controller, which was not given either, makes the torques follow.
     regained_from: the PI that was given, where records without a torque show other gains. lag: behind which a measured torque was
-    logged; the records then hold the one before it. found: the controller's numbers that the records show.
+    logged; the records then contain the one before it. found: the controller's numbers that the records show.
     outliers: digest of a record as given -> lines whose velocity stands in the log alone, interpolated here.
     """
 

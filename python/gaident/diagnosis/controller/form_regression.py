@@ -4,7 +4,7 @@
 
 For given filters this is a linear least squares in (kp, kp b, ki, a_ff, f_ff, u0).
 The filters' numbers are searched outside of it (variable projection, Golub and Pereyra 1973).
-u0 is what the integrator held before the record began.
+u0 is what the integrator stored before the record began.
 """
 
 from __future__ import annotations

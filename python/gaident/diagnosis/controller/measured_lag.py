@@ -5,7 +5,7 @@ first order is, where a line of the log is taken before (d = 1) or after (d = 0)
 
     u_m(n) = a u_m(n-1) + (1 - a) u(n-d) + I0 + noise,   a = exp(-T/tau)
 
-tau is fitted, I0 is what the integrator held before the record. Held against this is the same torque without a lag, d samples
+tau is fitted, I0 is what the integrator stored before the record. Compared with this is the same torque without a lag, d samples
 late and with other gains, by the information criterion with the noise of each, on the same lines of the log: none at the torque
 limit, and of each record none of the first, which a log without a lag may lack.
 A torque that is only late has a = 0: a lag is found where a is beyond its deviations, as tau is above 0 whatever the log says,
@@ -93,7 +93,7 @@ def lag_shown(records: Sequence[Record], controller: PI | None) -> Lag | None:
 
 
 def commanded(rec: Record, controller: PI) -> Record:
-    """The record with the torque that the controller makes of command and velocity, from what it held before."""
+    """The record with the torque that the controller makes of command and velocity, from what it stored before."""
     start = 0.0 if rec.torque is None else _stored_before(rec, controller)
     return rec.with_channels(torque_is=COMMANDED, torque=pi_torque(_command(rec), rec.velocity, rec.dt, controller, start))
 
@@ -133,7 +133,7 @@ def _free(made: Vector, controller: PI) -> NDArray[np.bool_]:
 
 
 def _stored_before(rec: Record, controller: PI) -> float:
-    """What the integrator held before the record [N m], where it is beyond the noise; else 0."""
+    """What the integrator stored before the record [N m], where it is beyond the noise; else 0."""
     logged, command = _logged(rec), _command(rec)
     off = logged - pi_torque(command, rec.velocity, rec.dt, replace(controller, torque_limit=None))
     below = np.abs(logged) < POLICY.noisy_plateau * controller.limits[0]
@@ -168,7 +168,7 @@ def _behind(torque: Vector, a: float, late: int) -> Vector:
 
 
 def _left(parts: Sequence[_Part], a: float, late: int) -> list[Vector]:
-    """Measured minus made torque behind the lag, each record without its mean: what the integrator held before it."""
+    """Measured minus made torque behind the lag, each record without its mean: what the integrator stored before it."""
     off = [(part.logged - _behind(part.made, a, late))[part.used] for part in parts]
     return [d - np.mean(d) for d in off]
 

@@ -47,7 +47,7 @@ class Limited:
 def run_error(records: Sequence[Record], controller: Cascade) -> float:
     """Root mean square of logged minus made torque [N m] over whole records, the controller at its own clock.
 
-    Of records that start in motion what the integrator held is not known: the controller runs without limits, and what is left
+    Of records that start in motion what the integrator stored is not known: the controller runs without limits, and what is left
     is taken without its mean in each stretch between two limits; on the lines at a limit it is 0 where the controller has one.
     """
     whole = [log_of(r, len(r), controller, True) for r in records]

@@ -8,7 +8,7 @@ A name rests on the records that were fitted. Data that no parameter has seen sp
 "Worse", "better" and "larger" are beyond the variation over blocks of the held-out data (95 % of a paired bootstrap): a lower
 error alone decides nothing. "Worse" is also by more than an effect may add to the error (`harm`): of two models that leave
 little more than the noise, one is surely the worse, by less than matters.
-A cause that the inverse-dynamics regression holds too, or that these records cannot tell from what it holds, stands:
+A cause that the inverse-dynamics regression contains too, or that these records cannot tell from what it contains, stands:
 a free run may miss where the data cannot show a motion, as speeds that are only held.
 """
 
@@ -59,7 +59,7 @@ def _lost(gains: Gains, check: Check) -> Text | None:
 
 
 def _witnessed(effects: Sequence[str], check: Check, same: Callable[[str], Collection[str]]) -> list[str]:
-    """Those that the regression holds too: itself, another of its family, or what is the same in these records."""
+    """Those that the regression contains too: itself, another of its family, or what is the same in these records."""
     if check.regression is None:
         return []
     terms = of_inverse_dynamics({name: e.value for name, e in check.regression.parameters.items()})

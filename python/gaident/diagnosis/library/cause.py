@@ -1,4 +1,4 @@
-"""An effect as a diagnosis sees it: a term of the estimation, and what records have to hold for it."""
+"""An effect as a diagnosis sees it: a term of the estimation, and what records have to contain for it."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ class Cause(Term):
     excited_by: names of the commands of the menu of experiments that excite it and tell it from others.
     alike: what records may lack -> the kinds that the effect then belongs to; effects of one kind are the same there.
     constant: whether its torque changes neither with the motion nor in time.
-    regressed: parameters of an inverse-dynamics regression -> its own, None where the regression does not hold the effect.
+    regressed: parameters of an inverse-dynamics regression -> its own, None where the regression does not contain the effect.
     """
 
     needs: tuple[Callable[[Motions], Text | None], ...] = ()

@@ -1,4 +1,4 @@
-"""Dry friction with its generalisations, of which a model holds one, and drag."""
+"""Dry friction with its generalisations, of which a model contains one, and drag."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ Vector = NDArray[np.float64]
 Matrix = NDArray[np.float64]
 
 FRICTION = "dry friction"
-"""The family of dry friction and its generalisations: a model holds one of them."""
+"""The family of dry friction and its generalisations: a model contains one of them."""
 
 
 def _stribeck(z: Matrix) -> Matrix:

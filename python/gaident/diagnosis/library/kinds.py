@@ -1,4 +1,4 @@
-"""Effects of the same kind, made by one function each; `known`: what else a `Cause` holds."""
+"""Effects of the same kind, made by one function each; `known`: what else a `Cause` contains."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What records have to hold for an effect to show: conditions, plain physics with the record's own figures.
+"""What records have to contain for an effect to show: conditions, plain physics with the record's own figures.
 
 Each condition takes the records and says why it is not met, or None. The rows of the library name the conditions of an effect.
 """
@@ -157,10 +157,10 @@ def part_of_a_turn(s: Motions) -> Text | None:
 
 
 def period_of_an_order(s: Motions) -> Text | None:
-    """The travel holds a period of the highest order that a drive is expected to have."""
+    """The travel contains a period of the highest order that a drive is expected to have."""
     highest = HIGHEST_ORDER * _per_turn(s)
     if s.travel < TURN / highest:
-        return say("{} hold no period of order {} or less", _travelled(s), order(highest))
+        return say("{} contain no period of order {} or less", _travelled(s), order(highest))
     return None
 
 
@@ -241,7 +241,7 @@ def shaft_resonates(s: Motions) -> Text | None:
 
 
 def torque_beyond(s: Motions) -> Text | None:
-    """Limits of the torque above what the records hold."""
+    """Limits of the torque above what the records contain."""
     limit = math.inf if s.controller is None else s.controller.limits[0]
     own = s.highest_torque > POLICY.at_limit * limit
     why = Text("the controller's own limit lets no more through") if own else say("no more {torque} was asked for")
@@ -249,15 +249,15 @@ def torque_beyond(s: Motions) -> Text | None:
 
 
 def loaded_before(s: Motions) -> Text | None:
-    """A constant load that the integrator of the controller held when a record without a torque began."""
+    """A constant load that the integrator of the controller stored when a record without a torque began."""
     if s.controller is None or s.controller.gains.ki == 0.0 or all(m.logged for m in s.records):
         return None
-    text = "no {torque} is logged: a load that the controller's integrator held when the record began shows in no other signal"
+    text = "no {torque} is logged: a load that the integrator stored when the record began shows in no other signal"
     return say(text)
 
 
 def integral_beyond(s: Motions) -> Text | None:
-    """Clamps of the controller's integral above what the records hold."""
+    """Clamps of the controller's integral above what the records contain."""
     if s.controller is None:
         return None
     integral = max((_integral(m, s.controller) for m in s.records), default=0.0)

@@ -12,8 +12,8 @@ driver beside it,
 Measured: square-root drag 0.77 to 0.87 by whatever friction comes closest, friction that varies with the angle 0.44 to 0.71; the
 friction of a real ball-screw axis (EMPS) 0.997, beside a remainder that is significant all the same.
 
-That share asks whether the finding is all there is. An axis may hold the cause and something else as large that the library does
-not hold: a joint whose friction has a part that grows with gravity's torque has dry friction, though it explains 0.45 of what a
+That share asks whether the finding is all there is. An axis may have the cause and something else as large that is not in the
+library: a joint whose friction has a part that grows with gravity's torque has dry friction, though it explains 0.45 of what a
 function of the position does. So dry friction also stands where the records show it without any model of the rest: the torque
 jumps at the reversals, beside the steepest drag, or the axis rests while its torque changes
 (`estimation/regression/reversal.py`). It is then a cause, and what is left remains named by its driver.

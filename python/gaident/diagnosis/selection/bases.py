@@ -241,7 +241,7 @@ def _by_output_errors(task: Task) -> ByOutputErrors:
 def _axis(data: DataSet) -> InverseDynamics | None:
     """The regressed axis; None where the records show none.
 
-    Records of held speeds hold no acceleration beyond its noise, and the cutoff that leaves only the acceleration leaves no rows:
+    Records of held speeds show no acceleration beyond its noise, and the cutoff that leaves only the acceleration leaves no rows:
     they show friction all the same, behind the lowest cutoff that leaves some, and an inertia beyond its deviations.
     """
     if not data.torque_logged:
@@ -269,7 +269,7 @@ def _axis(data: DataSet) -> InverseDynamics | None:
 def heaviest(data: DataSet, fit: Fit) -> float | None:
     """The inertia [kg m^2] from which a model counts as heavier than an axis that is regressed with its own terms.
 
-    A regression that holds gravity, a load or a spring which the model does not hold is that of another axis, and its inertia is
+    A regression that contains gravity, a load or a spring which is not in the model is that of another axis, and its inertia is
     another one. None where no such regression shows an inertia beyond its deviations.
     """
     axis = _axis(data)
@@ -288,9 +288,9 @@ def heaviest(data: DataSet, fit: Fit) -> float | None:
 
 
 def _contains(fit: Fit, term: str, turns_back: bool) -> bool:
-    """Whether a model holds what a term of the regression stands for; friction of either form counts as the same.
+    """Whether a model contains what a term of the regression stands for; friction of either form counts as the same.
 
-    turns_back: whether the regression holds dry friction, which it cannot tell from a constant torque in one direction.
+    turns_back: whether the regression contains dry friction, which it cannot tell from a constant torque in one direction.
     """
     names = [p.name for p in TERMS[term].parameters]
     if "spring" in names:

@@ -118,7 +118,7 @@ def beside_torque_noise(objective: Objective, fit: Fit) -> Dependence:
     """Every driver's gain over a model that a measured torque drives.
 
     The noise of that torque makes errors of the colour of the mechanism, slow ones and such that swing: a noise model of torques
-    at the shaft whitens them, and each sample counts. The torque is no driver here: a function of it holds its noise.
+    at the shaft whitens them, and each sample counts. The torque is no driver here: a function of it contains its noise.
     """
     shaft = ShaftNoise(fit.parameters.linear(fit.x), objective.data.dt, None)
     whitened = objective.under(Innovations(shaft))
@@ -136,7 +136,7 @@ def without_torque(left: Dependence) -> Dependence:
 def _strongest(rows: Matrix, room: int) -> Matrix:
     """As many combinations of the rows as a short record has room for: the principal components of the rows, each of size 1.
 
-    They are the same whatever the order of the rows, and hold of all of them as much as so few can.
+    They are the same whatever the order of the rows, and contain of all of them as much as so few can.
     """
     sizes = np.sqrt(np.einsum("ij,ij->i", rows, rows))
     if len(rows) <= room or not np.all(np.isfinite(sizes)):

@@ -168,7 +168,7 @@ class ModelSpace:
         return before - after > share * (before - noise)
 
     def hidden(self, whitened: Fit, other: Fit) -> bool:
-        """Whether whitening hides a cause that another model holds: it has passed for noise.
+        """Whether whitening hides a cause that another model contains: it has passed for noise.
 
         The two are different models, of which no specification test says anything. Both are fitted to the errors before
         whitening, under the same predictor. There the model without the cause leaves more than noise; the other one leaves at

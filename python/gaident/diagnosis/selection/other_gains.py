@@ -125,7 +125,7 @@ def _bare(space: Moves, fit: Fit) -> Fit:
 
 @dataclass(frozen=True, eq=False)
 class _Search:
-    """Fits under other gains, held against one selected model."""
+    """Fits under other gains, compared with one selected model."""
 
     space: Moves
     pi: PI

@@ -7,7 +7,7 @@
     3. Whitened errors decide where they leave noise (variance ratio) and where the estimates of whitened and of output errors of
        the selected model do not contradict each other (specification test). Else its errors are no stationary noise, and the
        model that output errors select is the result, with the information of its independent samples.
-    4. The same is the result where it holds a cause that the whitened errors hide: two models, compared before whitening.
+    4. The same is the result where it contains a cause that the whitened errors hide: two models, compared before whitening.
     5. The rivals of every effect.
 
 Long records are searched on a coarser grid of time first.
@@ -192,7 +192,7 @@ def _by_output_errors(output: ByOutputErrors, bases: Sequence[Fit], note: Callab
 
 
 def _informed(output: ByOutputErrors, linear: Fit, axis: Fit | None) -> Task:
-    """The task under output errors, with as many independent samples as the errors of the linear model hold.
+    """The task under output errors, with as many independent samples as the errors of the linear model contain.
 
     Or those of the regressed axis, if they are more: the errors of a better model are more independent. But a rigid axis in the
     place of a shaft that swings only leaves its ringing.

@@ -5,7 +5,7 @@
 x, numbers of the model, and z, numbers of the controller, are fitted together (`gaident.estimation.found_numbers`).
 No torque showed z.
 
-What comes out is held against a selected model. One that is fitted before whitening and stays far behind it is not followed.
+What comes out is compared with a selected model. One that is fitted before whitening and stays far behind it is not followed.
 """
 
 from __future__ import annotations

@@ -8,7 +8,7 @@ the drive has and the PI has not is then missing in that torque,
 and looks like mechanics: a lag, a resonance, an inertia that is far off. Each form has up to three numbers z, which are fitted
 with the model's (see `under_controller`).
 
-A form is looked for where the selected model leaves more than noise, or holds an effect that is linear in series, as a filter of
+A form is looked for where the selected model leaves more than noise, or has an effect that is linear in series, as a filter of
 the torque is. What it is worth is judged by the criterion that selected the model.
 """
 
@@ -198,7 +198,7 @@ def unlogged_form(space: Moves, final: Fit) -> UnloggedForm | None:
     """The form of controller with which the selected model, or what it is without effects in series, explains the records best.
 
     None where a torque is logged, where no bare PI from rest closes the loop, or where nothing asks for one: the model leaves
-    noise and holds nothing that a filter could be.
+    noise and contains nothing that a filter could be.
     """
     data, series = space.data, in_series(final)
     if data.pi is None or any(r.torque is not None or r.command is None for r in data.records):

@@ -73,7 +73,7 @@ TERMS: dict[str, TorqueTerm] = {
 }
 
 STEEP_DRAG = "steep_drag"
-"""A drag cbrt(w) that no choice of terms holds: beside it a jump at the reversal is dry friction (`reversal.py`)."""
+"""A drag cbrt(w) that no choice of terms contains: beside it a jump at the reversal is dry friction (`reversal.py`)."""
 
 COLUMNS: dict[str, TorqueTerm] = TERMS | {
     STEEP_DRAG: TorqueTerm(lambda m, _: [np.cbrt(m.velocity)], (Coefficient("steep_drag", "N m (s/rad)^(1/3)", "N (s/m)^(1/3)"),))

@@ -19,7 +19,7 @@ from gaident.show.report.views import View
 
 __all__ = ["page", "page_of_several"]
 
-# Nothing is fetched, whatever a page holds.
+# Nothing is fetched, whatever a page contains.
 POLICY = "default-src 'none'; style-src 'unsafe-inline'; script-src 'unsafe-inline'; img-src data: blob:"
 
 

@@ -53,7 +53,7 @@ class Head:
 
 
 class Section:
-    """A chapter of the page: key for links, title, what it holds."""
+    """A chapter of the page: key for links, title, what it contains."""
 
     def __init__(self, key: str, title: str, *parts: str) -> None:
         self.key, self.title, self.body = key, title, joined(p for p in parts if p)
@@ -110,7 +110,7 @@ def needs_record(view: View, what: str) -> Html:
         return Html()
     command = tag("code", "gaident report RESULT.json LOG --drive drive.toml --out report.html", class_="command")
     return box(
-        tag("p", f"{what} A saved result holds no samples; with the record beside it this part is filled: ", command),
+        tag("p", f"{what} A saved result contains no samples; with the record beside it this part is filled: ", command),
         kind="quiet",
     )
 

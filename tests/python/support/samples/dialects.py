@@ -1,4 +1,4 @@
-"""The run that every file of this folder holds, how to read each, and random tables in random dialects."""
+"""The run that every file of this folder contains, how to read each, and random tables in random dialects."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ RPM = 2 * math.pi / 60
 
 
 def sample_log() -> Record:
-    """What the files in this folder hold; see README.md."""
+    """What the files in this folder contain; see README.md."""
     k = np.arange(40)
     r = np.where(k < 5, 0.0, 100.0)
     w = np.where(k < 5, 0.0, 100 * (1 - np.exp(-(k - 5) / 8)))
@@ -71,7 +71,7 @@ UNITS = {"velocity": ("rpm", RPM), "torque": ("mN m", 1e-3), "command": ("deg/s"
 
 @st.composite
 def tables(draw: st.DrawFn) -> tuple[Record, bytes, dict[str, Any]]:
-    """A record, the bytes of a log that holds it, and what read must be told beyond the path."""
+    """A record, the bytes of a log that contains it, and what read must be told beyond the path."""
     n = draw(st.integers(20, 60))
     rng = np.random.default_rng(draw(st.integers(0, 10_000)))
     dt = draw(st.sampled_from([1e-3, 0.444e-3, 2 / 3 * 1e-3, 0.02]))
