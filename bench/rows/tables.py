@@ -60,7 +60,7 @@ def _last(row: PolicyRow, steps: Sequence[float], turned: set[float]) -> float:
 
 
 def merged(found: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
-    """What the file contains, what was measured now in the place of what was there of the same rows and kinds of cases."""
+    """What the file contains, with the rows and kinds of cases that were measured now in the place of the old ones."""
     there = json.loads(MEASURED.read_text(encoding="utf-8")) if MEASURED.exists() else []
     rows = {(each["name"], each["kind"]): dict(each) for each in [*there, *found]}
     return [rows[key] for key in sorted(rows) if rows[key]["used"]]

@@ -67,7 +67,7 @@ The truth: a dry friction of {FRICTION} N m, an inertia of {TRUTH.J:.4g} kg m^2,
 EMPS_STORY = "A ball-screw axis, measured (EMPS, Janot, Gautier and Brunot 2019; m, m/s, N, kg)"
 EMPS_TRUTH = """\
 Published for this axis: a mass of 95.1 kg and a dry friction of 20.4 N. The friction, which no linear model
-holds, biases the mass found here; the falsified verdict says so without knowing the truth."""
+contains, biases the mass found here; the falsified verdict says so without knowing the truth."""
 EMPS_FORCE = 35.15065188248547  # N/V, of the data set's authors: force = EMPS_FORCE * vir
 EMPS_CUTOFF = 100.0  # Hz, theirs too
 

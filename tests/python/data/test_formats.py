@@ -187,8 +187,8 @@ def test_formats_of_other_libraries(
     without_name = tmp_path / "log.bin"  # known by its content alone
     path.rename(without_name)
     check(read(without_name, columns=columns))
-    columns = read_columns(without_name)
-    assert any(key.endswith("w") for key in columns) and not any(key.endswith(("note", "word", "state")) for key in columns)
+    listed = read_columns(without_name)
+    assert any(key.endswith("w") for key in listed) and not any(key.endswith(("note", "word", "state")) for key in listed)
     damaged = tmp_path / f"damaged{Path(file).suffix}"
     damaged.write_bytes(without_name.read_bytes()[: without_name.stat().st_size // 3])
     with pytest.raises(ReadError, match=r"damaged\."):
