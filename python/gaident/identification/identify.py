@@ -260,7 +260,7 @@ class _Work:
         noise = selection.noise_of(self.searched, min(candidates, key=lambda c: c.cost), self.search_lengths)
         scores = selection.scored(self.searched, candidates, noise, self.search_lengths, self.ranges, self.workers)
         best = min(c.bic for c in scores)
-        near = [c.bic <= best + POLICY.part_reach * sum(self.search_lengths) for c in scores]
+        near = [c.bic <= best + math.log(POLICY.part_reach) * sum(self.search_lengths) for c in scores]
         return [c for c, n in zip(candidates, near, strict=True) if n], [
             c for c, n in zip(candidates, near, strict=True) if not n
         ]

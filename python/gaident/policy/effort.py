@@ -6,7 +6,6 @@ Searches and fits that need the same effort share a row.
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 
 from gaident.policy.declared import effort
@@ -22,9 +21,7 @@ class Effort:
     beam_width: int = effort(3, "1", "models that are carried on side by side")
     beam_reach: float = effort(4.0, "penalties", "how far behind the best a model is carried on")
     part_reach: float = effort(
-        math.log(2.0),
-        "BIC units per sample",
-        "how far behind the best structure on a part of the records one is fitted to all of them: twice its error power",
+        2.0, "1", "times the error power of the best structure on a part of the records, up to which one is fitted to all of them"
     )
     hope: float = effort(0.5, "1", "of what is asked for, that a linearised gain has to promise to be worth a fit")
     slow_fall: float = effort(0.1, "1", "of the cost: a fit that is far behind is left where a step brings less than this")
