@@ -20,7 +20,6 @@
 #include <variant>
 
 namespace gaident {
-
 // Control: ControllerState, or Servo.
 template <class R, class Plant, class Control>
 class EffectLoop {
@@ -68,7 +67,6 @@ public:
 
 private:
     static constexpr std::size_t width = static_cast<std::size_t>(Pack<R>::width);
-
     static Control controller_of(const EffectRun& run) {
         if constexpr (is_servo) return Control(run.loop.controller, run.loop.servo, run.sample_time);
         else return Control(run.loop.controller, Clock{run.sample_time});
@@ -276,7 +274,6 @@ private:
                 if (run_.effects.has<E>()) return x - E::torque(c_.effects.template of<E>(), theta_);
             return x;
         });
-
         const R w = plant_.velocity();
         if (own_.shaft()) [[unlikely]]
             T = own_.with_torque(w, theta_, T, t);
@@ -321,8 +318,12 @@ private:
                 add(width == 1 ? loaded_level_apart(run_, c_, theta_) : loaded_level(run_, c_, theta_));
         each_at<side>([&]<class Key, class E>() __attribute__((always_inline)) {
             if constexpr (hook::friction<E>)
-                if (run_.effects.has<Key>()) [[unlikely]]  // keeps what it needs out of the registers of the others
-                    E::friction(c_.template of<Key>(), states.template of<Key>(), step);
+                if (run_.effects.has<Key>()) {
+                    const auto& c = c_.template of<Key>();
+                    // Unlikely: what it needs is kept out of the registers of the others. Numbers of one register leave enough.
+                    if constexpr (width > 1 && Pack<R>::registers == 1) E::friction(c, states.template of<Key>(), step);
+                    else [[unlikely]] E::friction(c, states.template of<Key>(), step);
+                }
         });
         const R w_next = velocity_under_friction(step.law, w, step.w_free, step.beta);
         constexpr EffectSet behind = (side == Side::motor ? effects_with : load_effects_with)(Hooks::after_friction);
@@ -386,7 +387,6 @@ private:
     Control pi_;
     double h_, time_ = 0.0;
     bool dry_, turning_, looking_back_;
-
     OwnInLoop<R> own_;
     typename Effects::States<R> states_{};  // all zero
     FrictionLaw<R> law_;

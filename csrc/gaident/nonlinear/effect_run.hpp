@@ -65,11 +65,14 @@ struct PastTorques {
 // The dry friction at the motor's shaft that follows from the angle, itself or by what the effects there brake with, both in N m.
 template <class R>
 [[gnu::always_inline]] inline R loaded_level(const EffectRun& run, const EffectConstants<R>& c, R theta) {
-    const R load = Effects::chain(R(0.0), [&]<class E>(R x) __attribute__((always_inline)) {
-        if constexpr (hook::torque<E>)
-            if (run.effects.has<E>()) return x + E::torque(c.effects.template of<E>(), theta);
-        return x;
-    });
+    R load = R(0.0);
+    // One question where a model has none of them.
+    if (run.effects.meets(effects_with(Hooks::torque)))
+        load = Effects::chain(load, [&]<class E>(R x) __attribute__((always_inline)) {
+            if constexpr (hook::torque<E>)
+                if (run.effects.has<E>()) return x + E::torque(c.effects.template of<E>(), theta);
+            return x;
+        });
     return Effects::chain(R(0.0), [&]<class E>(R x) __attribute__((always_inline)) {
         if constexpr (hook::loaded<E>)
             if (run.effects.has<E>()) return x + E::loaded(c.effects.template of<E>(), load);
