@@ -139,13 +139,6 @@ class Controller(ABC):
         """Angle [rad] at which its axis rests before a log without a position; source: of `command_of`, (n,)."""
         return float(source[0]) if self.driven_by == "position_command" else 0.0
 
-    def simulated_with(self, dt: float) -> Controller | None:
-        """What an estimation closes a simulated loop over, the log's sample time dt [s]; None: the torque drives the model.
-
-        Where the log has a line for each sample of what is no bare PI, its torque says all that this controller did.
-        """
-        return self if self.one_equation or self.log_every(dt) > 1 else None
-
     def line_equation(self, log: LoopSignals, poles: int) -> bool:
         """Whether one difference equation takes a log that starts at rest from line to line, although it samples faster.
 

@@ -166,10 +166,9 @@ def closed_over(controller: Controller | None, records: Sequence[Record]) -> Con
 
     How a loop moved before a record is known of a bare PI only; any other is simulated from rest.
     """
-    loop = None if controller is None else controller.simulated_with(records[0].dt)
-    if loop is not None and not loop.one_equation and any(starts_moving(r, None) for r in records):
+    if controller is not None and not controller.one_equation and any(starts_moving(r, None) for r in records):
         return None
-    return loop
+    return controller
 
 
 def _turned(rec: Record, controller: Controller | None, final: Fit) -> Record:

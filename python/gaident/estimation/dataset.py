@@ -213,13 +213,13 @@ class DataSet:
     @cached_property
     def stored(self) -> tuple[float, ...]:
         """What the integrator stored before each of the records, for a load [N m]."""
-        loop = None if self.controller is None else self.controller.simulated_with(self.dt)
+        loop = self.controller
         return tuple(0.0 if loop is None else stored_torque(r, loop) for r in self.records)
 
     @cached_property
     def loop(self) -> Controller | None:
         """What a simulated loop is closed over; None: the torque drives the model."""
-        return None if self.controller is None else self.older(self.controller.simulated_with(self.dt))
+        return None if self.controller is None else self.older(self.controller)
 
     @property
     def pi(self) -> PI | None:
@@ -246,7 +246,7 @@ class DataSet:
     @property
     def slower(self) -> bool:
         """Whether the log has fewer lines than the controller samples: the torque is then known on the lines only."""
-        return self.loop is not None and self.pi is None
+        return self.controller is not None and self.controller.log_every(self.dt) > 1
 
     def loaded(self, records: Sequence[Record], controller: Controller | None) -> tuple[LoadedRecord, ...]:
         """Records as the core takes them, in this loop; those of the data set itself are loaded once.

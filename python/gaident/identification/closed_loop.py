@@ -66,7 +66,9 @@ def looped_over(records: Sequence[Record], controller: Controller | None, space:
         straight = [straight_driven(r, controller).with_channels(command=None) for r in records]
         return Looped(straight, None, (*torque_driven(records, controller).notes, *doubts, NOT_THE_LOOP))
     driven = torque_driven(records, controller)
-    given = [r.with_channels(command=None) for r in driven.records] if driven.slower else list(driven.records)
+    given = list(driven.records)
+    if controller is not None and driven.loop is None:
+        given = [r.with_channels(command=None, position_command=None) for r in given]
     given = given if driven.slower or driven.loop is not None else [as_old_as_its_velocity(r) for r in given]
     return Looped(given, driven.loop, (*driven.notes, *driven.doubts, *doubts))
 

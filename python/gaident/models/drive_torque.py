@@ -66,7 +66,7 @@ def torque_driven(records: Sequence[Record], controller: Controller | None) -> D
         return Driven(tuple(records), controller)
     every = max(controller.log_every(r.dt) for r in records)
     if every == 1:
-        note = say("The controller is not a bare PI: its {torque} drives the model, and no loop is simulated.")
+        note = say("The controller is not a bare PI: the linear model is identified from its {torque}, not in a simulated loop.")
     else:
         text = (
             "The controller samples {} times for each line of the log. The linear model is identified from the logged "
@@ -109,7 +109,7 @@ def driven_by(rec: Record, controller: Controller) -> Record:
     torque = made_by(rec, controller) if rec.torque is None else rec.torque
     before = torque[0] if starts_moving(rec.with_channels(torque=torque), None) else 0.0
     if every == 1:
-        return rec.with_channels(torque=late(torque, controller.delay / rec.dt, before), command=None, position_command=None)
+        return rec.with_channels(torque=late(torque, controller.delay / rec.dt, before))
     mean = _at_its_clock(rec, torque, controller).reshape(len(rec), every).mean(axis=1)
     return rec.with_channels(torque=late(mean, controller.delay / rec.dt, before))
 

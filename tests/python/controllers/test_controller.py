@@ -137,8 +137,6 @@ def test_controllers_answer_for_themselves() -> None:
     cascade = ga.Cascade(other, period=1e-3, position=ga.P(20.0))
     assert [c.one_equation for c in (bare, other, cascade)] == [True, False, False]
     assert [c.driven_by for c in (bare, other, cascade)] == ["command", "command", "position_command"]
-    assert [c.simulated_with(1e-3) for c in (bare, other, cascade)] == [bare, None, None]
-    assert cascade.simulated_with(4e-3) is cascade
     assert bare.limited and bare.limits == (np.inf, 0.2) and not cascade.limited
     assert cascade.with_limits(None, 0.3).velocity.integrator_limit == 0.3
     holding = ga.PI(0.1, 1.0, torque_limit=2.0, anti_windup="tracking", tracking_time=1e-3)

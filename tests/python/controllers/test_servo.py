@@ -213,7 +213,7 @@ def test_the_torque_drives_the_identification() -> None:
     assert (idn.p, idn.q) == (1, 0)
     assert idn.mechanics is not None
     assert pytest.approx(1e-3, rel=2e-3) == idn.mechanics.J
-    assert any("its torque drives the model" in w for w in idn.warnings)
+    assert any("identified from its torque" in w for w in idn.warnings)
 
 
 def test_a_torque_that_another_controller_made_is_said() -> None:

@@ -163,7 +163,7 @@ def controller_findings(data: DataSet, scales: Scales) -> tuple[list[Finding], A
         finding = _finding(effect, name, Estimate(value, std, unit), before, cost, floor, n, text)
         limited = _with_limit(controller, effect, value)
         return [finding], AtController(_decided(), {effect: {name: value}}, limited), []
-    return [], AtController(_decided(), follows=data.loop is None), notes  # where no loop is simulated, none is wrong
+    return [], AtController(_decided(), follows=False), notes
 
 
 def _with_limit(controller: Controller, effect: str, value: float) -> Controller | None:

@@ -382,6 +382,22 @@ class Moves(SideMoves):
         key = "evolved", start.key, self.policy.evolution
         return self.objective.once(key, lambda: self.finished(ls.evolved(self.objective, start, self.policy.evolution)))
 
+    def deepened(self, fit: Fit) -> Fit:
+        """A model with impacts, searched globally nearby until that brings no more.
+
+        Each impact more or less is a valley of the cost, also where the errors are as small as the noise that the velocity shows.
+        """
+        if not any(t.multimodal and t.in_coupling for t in fit.parameters.terms):
+            return fit
+        for _ in range(self.policy.usual):
+            found = self.evolved(fit)
+            found = min((found, self.refitted(found.hypothesis, found.x, self.policy.long)), key=self.score)
+            gained = self.score(fit) - self.score(found)
+            fit = found if gained > 0.0 else fit
+            if gained <= self.margin:
+                break
+        return fit
+
     def valleys(self, base: Fit) -> list[Fit]:
         """Each multimodal effect alone beside a base, by a global search."""
         found = []

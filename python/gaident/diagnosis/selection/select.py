@@ -102,12 +102,15 @@ def selected(
     blocks = blocks_of(task.data, error)
     if blocks == 1:
         found = _decided(task, note)
-        return _compared(found, classes, note)
+        return _compared(found.of(found.space.deepened(found.final)), classes, note)
     grid = decimated_objective(task.objective, blocks)
     coarse_scales = replace(scales, dt=task.data.dt * blocks, blocks=blocks)
     outside = tuple(t for t in task.allowed if not t.in_controller)
     outline = _decided(Task(grid, coarse_scales, model, outside, note, most), note)
-    return _compared(_on_all_samples(task, outline, note), classes, note)
+    found = _on_all_samples(task, outline, note)
+    if task.data.fits_in_loop and not (found.space.is_noise(found.final) and found.space.small_unwhitened(found.final)):
+        found = _searched_whole(task, found, note)
+    return _compared(found.of(found.space.deepened(found.final)), classes, note)
 
 
 @dataclass(frozen=True, eq=False)
@@ -321,6 +324,19 @@ def _on_all_samples(task: Task, outline: _Found, note: Callable[[str], None]) ->
     final = _beam(space).run([final]) if not without or space.score(final) < space.score(without[0]) else without[0]
     test = specification(space, task, final) if space.whitens else outline.specification
     return _Found(space, base, base, test).of(final)
+
+
+def _searched_whole(task: Task, found: _Found, note: Callable[[str], None]) -> _Found:
+    """The search over all samples, in the loop, and what the coarse grid led to where that scores better there.
+
+    A controller samples as it does: on a coarse grid its torque drives the model, and what stops or hits something runs away from
+    the record.
+    """
+    note("searching all samples, in the loop")
+    whole = _decided(task, note)
+    space = whole.space
+    better = _improved(space, space.refitted(found.final.hypothesis.over(space.data), found.final.x), whole.final)
+    return whole if better is whole.final else whole.of(better)
 
 
 def _moved(space: Moves, scales: Scales, fit: Fit) -> Fit:

@@ -12,7 +12,8 @@ encoder has it. Left out, it is fitted as a delay or, beside a current loop, as 
   loop, and it is none where the age of 0 scores better beyond the margin of two rivals.
 - On another lattice (a gear, a scale, a unit between) the velocity may be a difference. Where the search finds something linear
   in series with the mechanism, a delay, a lag or a resonance, it is made again with the age of half a sample, which is no effect
-  and costs nothing; it is there where fewer effects score better with it, both under the errors of the first search.
+  and costs nothing; it is there where fewer effects score better with it, or as many by the margin of two rivals, both under the
+  errors of the first search.
 
 A torque that drives the model is held over each line of the log. That of a controller which is faster than the log goes on
 between the lines: its mean over a line of r samples is (r - 1)/(2r) lines ahead, less the age of the velocity. A motion before
@@ -26,6 +27,7 @@ from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from gaident.axis import TURN, Text, say
 from gaident.data.signals.difference import is_backward_difference
@@ -48,6 +50,8 @@ from gaident.models.model import Model
 from gaident.policy.table import POLICY
 
 __all__ = ["searched"]
+
+Vector = NDArray[np.float64]
 
 EXACT = 1e-3  # no decision: lines, what the parabola of a lag is exact to
 
@@ -110,17 +114,54 @@ def searched(
     step = encoder_step(data.velocity, data.axis == "linear") if in_series else 0.0
     if not step > 0.0:
         return found, []
-    # Only a model with fewer effects takes the place: first whether there is one, then what the whole search ends with.
+    # Half a sample costs nothing: a model with fewer effects takes the place, or one that is better by the margin of two rivals.
+    # First whether there is one, then what the whole search ends with.
     for allowed in (len(found.final.effects) - 1, most):
         again = search(older, allowed)
-        fewer = len(again.final.effects) < len(found.final.effects)
-        if not fewer or not _score_beside(again, found) < found.space.score(found.final):
-            return found, []
+        if not _better(again, found):
+            break
+    else:
+        return again, [_on_a_lattice(step, age)]
+    if _late_otherwise(found, older) and _better(again := search(older, most), found):
+        return again, [_on_a_lattice(step, age)]
+    return found, []
+
+
+def _on_a_lattice(step: float, age: float) -> Text:
     text = (
         "The velocities lie on a lattice of {:.4g} {rad/s} and are half a sample old ({:.3g} ms), as those are that are the "
         "difference of an encoder's {angle} over one sample. The simulation has it; it is no finding."
     )
-    return again, [say(text, step, age)]
+    return say(text, step, age)
+
+
+def _better(again: Selection, found: Selection) -> bool:
+    """Whether the model of one search takes the place of that of another, which was under a velocity of age 0."""
+    fewer = len(again.final.effects) < len(found.final.effects)
+    margin = 0.0 if fewer else POLICY.rival_margin
+    return _score_beside(again, found) < found.space.score(found.final) - margin
+
+
+def _late_otherwise(found: Selection, older: Objective) -> bool:
+    """Whether a model without one of its lags and delays, or with another one there, is better over the older velocities by the
+    margin of two rivals."""
+    space, final = found.space, found.final
+    tries = []
+    for term in final.parameters.terms:
+        if not term.in_series:
+            continue
+        short, x, z = final.hypothesis.without(term.name), *_parted(final, term)
+        tries.append(replace(final, hypothesis=short, x=x))
+        for other in LIBRARY.values():
+            if other.in_series and other.size == term.size and other.name not in final.effects:
+                longer = short.extended(other)
+                tries.append(replace(final, hypothesis=longer, x=short.parameters.inserted(x, z)))
+    return any(_score_under(older.data, f, space) < space.score(final) - POLICY.rival_margin for f in tries)
+
+
+def _parted(fit: Fit, term: Term) -> tuple[Vector, Vector]:
+    """(x without an effect, the coordinates of the effect)."""
+    return fit.parameters.removed(fit.x, term.name), fit.x[fit.parameters.slot(term.name)]
 
 
 def _ahead(data: DataSet, model: Model) -> TorqueLag | None:
