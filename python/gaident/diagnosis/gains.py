@@ -7,7 +7,7 @@ so.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from gaident.control.controller import Controller
 from gaident.control.pi import bare_pi
 from gaident.data.record import Record
+from gaident.diagnosis.library.terms import LIBRARY
 from gaident.diagnosis.records.hygiene import quantisation
 from gaident.estimation.criterion import effective_samples
 from gaident.estimation.dataset import DataSet
@@ -88,7 +89,7 @@ def measured_gains(
     at_controller: dict[str, dict[str, float]],
 ) -> Gains:
     """Errors of the linear model, of each stage and of the extended model, closed over the controller where they can be."""
-    loop = closed_over(controller, (*records, *validation))
+    loop = closed_over(controller, (*records, *validation), final.effects)
     controller = objective.data.older(loop)
     part: tuple[int, ...] | None
     if validation:
@@ -161,14 +162,18 @@ def measured_gains(
     )
 
 
-def closed_over(controller: Controller | None, records: Sequence[Record]) -> Controller | None:
-    """What the free runs of these records are closed over; None: their torque drives them.
+def closed_over(controller: Controller | None, records: Sequence[Record], effects: Collection[str] = ()) -> Controller | None:
+    """What the free runs of these records are closed over, with these effects; None: their torque drives them.
 
     How a loop moved before a record is known of a bare PI only; any other is simulated from rest.
+    Where the log has a line for each sample of another controller, the torque drives: what that controller answered to noise is
+    in it, and would be missing from a loop. But impacts lead a model astray that its torque alone drives.
     """
-    if controller is not None and not controller.one_equation and any(starts_moving(r, None) for r in records):
-        return None
-    return controller
+    if controller is None or controller.one_equation:
+        return controller
+    slower = any(controller.log_every(r.dt) > 1 for r in records)
+    impacts = any(LIBRARY[e].multimodal and LIBRARY[e].in_coupling for e in effects if e in LIBRARY)
+    return controller if (slower or impacts) and not any(starts_moving(r, None) for r in records) else None
 
 
 def _turned(rec: Record, controller: Controller | None, final: Fit) -> Record:

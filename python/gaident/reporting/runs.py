@@ -44,7 +44,7 @@ def run_of(result: Diagnosis | Identification, rec: Record) -> RecordView:
             used, first_held_out = "held out", 0
         elif used == "fitted" and not result.validation_digests and result.held_out != IN_SAMPLE:
             first_held_out = held_out_from(rec)
-        closed = closed_over(result.controller, (rec,))
+        closed = closed_over(result.controller, (rec,), [e.name for e in result.model.effects])
         before = _free_run(result.identification.model, rec, closed, "linear", notes)
         if result.model.effects:
             extended = _free_run(result.model, rec, closed, "extended", notes)

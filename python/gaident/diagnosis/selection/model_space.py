@@ -124,12 +124,15 @@ class ModelSpace:
     def small_unwhitened(self, fit: Fit) -> bool:
         """Whether the errors before whitening, in the loop where there is one, are little more than the noise.
 
-        A loop that begins under a load hides it from a model that has none: the torque drives that one.
+        A loop that begins under a load hides it from a model that has none: the torque drives that one. Where the torque of each
+        sample is known, it is enough that it leaves so little by itself: a loop lacks what the controller answered to noise.
         """
         loaded = self.data.simulates_loop and any(LIBRARY[e].constant for e in fit.effects)
         in_loop = self.data.fits_in_loop or loaded
-        inside = fit.hypothesis.driven_by(self.closed(fit.predictor)) if in_loop else fit.hypothesis
-        cost = float(self.objective.costs(inside, fit.x[None, :], WHITE)[0])
+        ways = [fit.hypothesis.driven_by(self.closed(fit.predictor)) if in_loop else fit.hypothesis]
+        if in_loop and not self.data.loop_only:
+            ways.append(fit.hypothesis.driven_by(OpenLoop(self.data, fit.predictor.own_angle)))
+        cost = min(float(self.objective.costs(way, fit.x[None, :], WHITE)[0]) for way in ways)
         return bool(np.sqrt(cost / self.objective.count) < self.policy.free_run_ratio * self.noise_beside(fit))
 
     def worth(self, fuller: Fit, simpler: Fit) -> bool:
