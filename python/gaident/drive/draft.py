@@ -298,11 +298,12 @@ class _Draft:
         if "torque" in self.guess.channels:
             text += ', "unknown", or loop = "open"'
         alone = self._placed and not {"command", "torque"} & self.guess.channels.keys()
-        mark = self._todo if alone or "command" in self.guess.channels else lambda line, _, comment: _line(line, comment)
-        torque = word("torque", self.axis)
         positioned = "position_command" in self.guess.channels
+        driven = positioned or "command" in self.guess.channels
+        mark = self._todo if driven else lambda line, _, comment: _line(line, comment)
+        torque = word("torque", self.axis)
         place = "# position_gain = 40.0"
-        if alone:
+        if alone:  # without a torque the loop is all that drives the model
             gain = self._todo(place, "controller.position_gain", "1/s; position command and position drive the loop")
         else:
             gain = _line(place, "1/s; without it the velocity command drives the loop")
@@ -311,9 +312,11 @@ class _Draft:
             mark("# ki = 1.367", "controller.ki", f"{unit('N m/rad', self.axis)}; integral gain"),
             *([gain] if positioned else []),
             _line('# loop = "sampled"', f'a digital drive; or "continuous"; or "open": the {torque} drives the model'),
+            _line('# rule = "backward"', 'of the integral, or "forward"; left out: "trapezoidal"'),
             _line("# torque_limit = 2.4", "a known limit of the controller, and integrator_limit"),
+            _line('# anti_windup = "hold"', 'at a torque_limit; or "tracking" with tracking_time'),
             _line('# drive = "sinamics"', "with p1460 and p1462 in place of kp and ki: gains as the drive shows them"),
-            _line("# period = 125e-6", "s, of a controller that is faster than the log; also rule, delay, torque_filters, ..."),
+            _line("# period = 125e-6", "s, of a controller that is faster than the log; also delay, torque_filters, ..."),
         ]
 
     def _space(self) -> list[str]:

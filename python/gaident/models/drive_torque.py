@@ -66,7 +66,11 @@ def torque_driven(records: Sequence[Record], controller: Controller | None) -> D
         return Driven(tuple(records), controller)
     every = max(controller.log_every(r.dt) for r in records)
     if every == 1:
-        note = say("The controller is not a bare PI: the linear model is identified from its {torque}, not in a simulated loop.")
+        text = (
+            "The controller has more to it than kp and ki with the trapezoidal rule: the linear model is identified from its "
+            "{torque}, not in a simulated loop."
+        )
+        note = say(text)
     else:
         text = (
             "The controller samples {} times for each line of the log. The linear model is identified from the logged "

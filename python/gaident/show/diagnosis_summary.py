@@ -21,6 +21,7 @@ from gaident.show.wording import (
     certainty,
     controller_lines,
     either,
+    free_run_words,
     missing_words,
     number,
     table,
@@ -170,8 +171,8 @@ def _gain(dia: Diagnosis, axis: str, scales: Scales) -> list[str]:
     extended = bool(dia.model.effects)
     rows: list[tuple[str, ...]] = [
         ("", f"rmse [{v}]", "fit [%]"),
-        ("linear model", number(dia.before.rmse), f"{dia.before.fit_percent:.2f}"),
-        ("extended model", number(dia.after.rmse), f"{dia.after.fit_percent:.2f}"),
+        ("linear model", *free_run_words(dia.before)),
+        ("extended model", *free_run_words(dia.after)),
         ("noise of the measured velocity", number(dia.after.noise_floor), ""),
     ]
     if v in scales:
@@ -281,8 +282,9 @@ def _base(dia: Diagnosis, axis: str) -> list[str]:
 
 def moved_words(old: float, new: float, std: float | None) -> str:
     """By how much a parameter moved; empty where it was 0 within its deviation, for no share of that means anything."""
-    nothing = not math.isfinite(old) or abs(old) <= POLICY.below_zero * (std or 0.0)
-    return "" if nothing else f"{round(100.0 * (new / old - 1.0), 1) + 0.0:+.1f} %"
+    if not math.isfinite(old) or abs(old) <= POLICY.below_zero * (std or 0.0):
+        return ""
+    return f"{round(100.0 * (new / old - 1.0), 1) + 0.0:+.1f} %" if old * new > 0.0 else "other sign"
 
 
 def _record(dia: Diagnosis, axis: str) -> list[str]:

@@ -35,6 +35,8 @@ def relevance_words(dia: Diagnosis, axis: str, scales: Scales) -> str:
     if asked:
         surely = "" if dia.driver is not None else ", though nothing of it is significant"
         return f"{begun}: the accuracy that was asked for, {' and '.join(asked)}, is not met{surely}."
+    if not r.velocity and not r.torque:
+        return "It is less than the noise: significant, but negligible."
     if r.negligible:
         return f"{begun}: significant, but negligible, as it is less than the noise."
     return f"{begun}; the noise is {_shown(r.noise, v, scales)}."

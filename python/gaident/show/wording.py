@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 
 from gaident.axis import identifier_words, unit, word
 from gaident.results.diagnosis import Diagnosis
 from gaident.results.estimate import Estimate
 from gaident.results.finding import Finding, where
+from gaident.results.fitness import Fitness
 
 __all__ = [
-    *("cause_words", "certainty", "controller_lines", "either", "missing_words", "number", "size_words", "structure_words"),
-    *("WIDTH", "table", "with_std", "words"),
+    *("cause_words", "certainty", "controller_lines", "either", "free_run_words", "missing_words", "number", "size_words"),
+    *("WIDTH", "structure_words", "table", "with_std", "words"),
 ]
 
 WIDTH = 100  # no decision: letters of a line
@@ -33,6 +34,13 @@ def structure_words(p: int, q: int) -> str:
 def number(value: float, digits: int = 4) -> str:  # no decision: how a number is printed
     """`value` with so many significant digits; a dash where there is none."""
     return f"{value + 0.0:.{digits}g}" if math.isfinite(value) else "-" if math.isnan(value) else f"{value}"
+
+
+def free_run_words(run: Fitness, written: Callable[[float], str] = number) -> tuple[str, str]:
+    """(rmse, fit in percent) of a free run; a run whose error is a thousand times the motion diverges, and has no figures."""
+    if run.fit_percent < -1e5:  # no decision: how a number is printed
+        return "diverges", ""
+    return written(run.rmse), f"{run.fit_percent:.2f}"
 
 
 def with_std(value: float, std: float | None) -> str:

@@ -95,3 +95,15 @@ def test_signals_of_one_axis_are_no_axes(run: ga.Record) -> None:
     ):
         written("one.csv", names, rows)
         assert axes_of(columns("one.csv")) == {}
+
+
+def test_the_gains_are_asked_for_in_a_position_loop_too(run: ga.Record) -> None:
+    """Also where a torque could drive the model; rule and anti-windup are offered."""
+    angle = np.cumsum(run.velocity) * 1e-3
+    rows = np.column_stack([1e3 * run.time, angle + 0.01, angle, RPM * run.velocity, run.torque])
+    written("move.csv", ["t [ms]", "pos_set [rad]", "pos_act [rad]", "n_act [rpm]", "M_set [Nm]"], rows)
+    assert main(["init", "move.csv"]) == 0
+    text = Path("drive.toml").read_text(encoding="utf-8")
+    assert 'position_command = "pos_set [rad]"' in text
+    assert re.search("^# kp = .*FILL IN", text, re.MULTILINE) and re.search("^# ki = .*FILL IN", text, re.MULTILINE)
+    assert re.search('^# rule = "backward" ', text, re.MULTILINE) and re.search('^# anti_windup = "hold" ', text, re.MULTILINE)

@@ -98,6 +98,7 @@ def test_the_size_is_in_the_users_unit_with_si_behind() -> None:
     )
     assert "is not met, though nothing of it is significant" in said(asked, None)
     assert said(left, None) == "" == said(None)
+    assert said(Relevance(0.0, 0.3, 0.0, 0.004)) == "It is less than the noise: significant, but negligible."
 
 
 def test_a_finding_beside_the_accuracy() -> None:

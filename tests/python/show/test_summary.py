@@ -12,8 +12,10 @@ import pytest
 
 import gaident as ga
 from gaident.results.estimate import Estimate
+from gaident.results.fitness import Fitness
 from gaident.show import identification_summary, mechanics_comparison
-from gaident.show.wording import number, structure_words, table, with_std
+from gaident.show.diagnosis_summary import moved_words
+from gaident.show.wording import free_run_words, number, structure_words, table, with_std
 from places import GOLDEN
 
 TEXT = GOLDEN / "identification.txt"
@@ -162,6 +164,16 @@ def test_comparison_with_the_truth() -> None:
 )
 def test_value_with_std(value: float, std: float | None, text: str) -> None:
     assert with_std(value, std) == text
+
+
+def test_what_diverges_has_no_figures_and_what_turns_has_no_share() -> None:
+    assert free_run_words(Fitness(6.4e140, -2.7e141, 0.01)) == ("diverges", "")
+    assert free_run_words(Fitness(0.1585, 99.731, 0.01)) == ("0.1585", "99.73")
+    assert [moved_words(*values, 1e-4) for values in ((-0.0032, 0.0229), (0.02, 0.021), (1e-5, 0.02))] == [
+        "other sign",
+        "+5.0 %",
+        "",
+    ]
 
 
 def test_wording() -> None:

@@ -11,6 +11,7 @@ from gaident.models.factors import gain_unit
 from gaident.results.diagnosis import Diagnosis
 from gaident.results.estimate import Estimate
 from gaident.results.finding import Finding
+from gaident.results.fitness import Fitness
 from gaident.show.diagnosis_summary import (
     DRIVERS,
     TESTED_UP_TO,
@@ -46,7 +47,7 @@ from gaident.show.report.parts import (
 )
 from gaident.show.report.views import View
 from gaident.show.second_method import comparison_rows, force_rows, force_words, method_words
-from gaident.show.wording import cause_words, either, missing_words, words
+from gaident.show.wording import cause_words, either, free_run_words, missing_words, words
 
 __all__ = ["chapters", "headline", "mark", "tiles"]
 
@@ -220,13 +221,18 @@ def _parameters(dia: Diagnosis, view: View, drawn: Charts) -> Section:
     return Section("parameters", "Parameters", *parts)
 
 
+def _free_run(run: Fitness) -> tuple[str, Html]:
+    rmse, fit = free_run_words(run, number)
+    return rmse, typeset(fit)
+
+
 def _gain(dia: Diagnosis, view: View, drawn: Charts) -> Section:
     axis = view.axis
     v = velocity_unit(axis)
     extended = bool(dia.model.effects)
-    rows: list[Row] = [("linear model", number(dia.before.rmse), typeset(f"{dia.before.fit_percent:.2f}"))]
+    rows: list[Row] = [("linear model", *_free_run(dia.before))]
     if extended:
-        rows.append(("extended model", number(dia.after.rmse), typeset(f"{dia.after.fit_percent:.2f}")))
+        rows.append(("extended model", *_free_run(dia.after)))
     rows.append(("noise of the measured velocity", number(dia.after.noise_floor), ""))
     parts: list[str] = []
     if dia.held_out == "in-sample":

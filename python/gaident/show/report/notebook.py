@@ -11,7 +11,7 @@ from gaident.show.report import diagnosis, identification
 from gaident.show.report.parts import Head, estimate
 from gaident.show.report.views import View
 from gaident.show.summary import meaning_of
-from gaident.show.wording import cause_words, structure_words, words
+from gaident.show.wording import cause_words, free_run_words, structure_words, words
 
 __all__ = ["diagnosis_html", "identification_html"]
 
@@ -36,9 +36,9 @@ def diagnosis_html(dia: Diagnosis) -> Html:
     causes = table(("cause", "parameter", "value", "unit"), [rows], left=(0, 1, 3)) if rows else Html("")
     if evidence:
         causes = joined((causes, tag("ul", *evidence)))
-    errors: list[Row] = [("linear model", number(dia.before.rmse), f"{dia.before.fit_percent:.2f}")]
+    errors: list[Row] = [("linear model", *free_run_words(dia.before, number))]
     if dia.model.effects:
-        errors.append(("extended model", number(dia.after.rmse), f"{dia.after.fit_percent:.2f}"))
+        errors.append(("extended model", *free_run_words(dia.after, number)))
     errors.append(("noise", number(dia.after.noise_floor), ""))
     where = f"{UNITS}; {dia.held_out}"
     return _framed(diagnosis.head(dia, View(axis=dia.axis)), causes, table(("", "rmse", "fit [%]"), [errors], left=(0,)), where)
