@@ -61,7 +61,7 @@ class Check:
 
     regression_better: whether the regression leaves less torque, beyond the variation over blocks of the held-out data.
     notes: contradictions, in words. reason: why the force error is the figure to go by on this axis, in words; empty where the
-    free run is as good a figure.
+    free run is as good a figure. loses: whether the regression leaves far less, by more than `loses`, and that matters.
     """
 
     regression: InverseDynamics | None
@@ -72,6 +72,7 @@ class Check:
     notes: tuple[Text, ...]
     reason: Text
     regression_better: bool = False
+    loses: bool = False
 
 
 def checked(data: DataSet, gains: Gains, model: Model, mechanics: Mapping[str, Estimate], effects: Effects) -> Check:
@@ -91,8 +92,9 @@ def checked(data: DataSet, gains: Gains, model: Model, mechanics: Mapping[str, E
     comparisons = tuple(_compared(found, mechanics, effects, after.torque_rms or 0.0, bool(effects_before_the_shaft(model))))
     verdict = _verdict(after.force_error, second)
     notes = tuple(_sentence(c) for c in comparisons if c.differs)
-    notes = (*notes[:-1], joined("", (notes[-1], verdict))) if notes else _lost(after, second, better)
-    return Check(found, second, comparisons, before, after, notes, _reason(effects, driven), better)
+    lost = _lost(after, second, better)
+    notes = (*notes[:-1], joined("", (notes[-1], verdict))) if notes else lost
+    return Check(found, second, comparisons, before, after, notes, _reason(effects, driven), better, bool(lost))
 
 
 def _regression(records: Sequence[Record], model: Model, axis: str) -> InverseDynamics | None:

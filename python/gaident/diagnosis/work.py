@@ -241,7 +241,7 @@ class Work:
             model = with_effects(self.estimate.parameters.model(self.estimate.x), self.at_controller.effects)
             check = by_second_method(self.data, gains, model, mechanics, estimates)
             causes, why = standing(causes, gains, check, self._equivalent_here)
-            if why:
+            if why or check.loses:
                 driver = driver or self.left.strongest or "time"
                 self.notes += why
             instead = None if causes else by_whitened_errors(self.found, self._equivalent_here, self._say)
