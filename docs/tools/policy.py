@@ -33,6 +33,9 @@ Other numbers decide nothing and bound no search: the tolerance of a solver, the
 size of a block in memory.
 They stand where they are used, with a name or the remark `no decision`, which says why.
 The bounds and starts of each effect's parameters stand in the effect's row of `diagnosis/library/`.
+The genetic search of the core has budgets of its own: starts, iterations, and how far behind the best a structure is fitted to
+the end (`csrc/gaident/search/species.hpp`); `bench/success.py` measures what they find.
+What it hands over is decided about here.
 The core (`csrc/gaident`) decides about no model, but into how many substeps it cuts a sample (`substeps_for` in
 `nonlinear/effect_prepare.cpp`) sets how exact a simulation is: [what was measured](../effects.md#how-exact-it-is).
 

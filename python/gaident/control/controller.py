@@ -139,6 +139,11 @@ class Controller(ABC):
         """Angle [rad] at which its axis rests before a log without a position; source: of `command_of`, (n,)."""
         return float(source[0]) if self.driven_by == "position_command" else 0.0
 
+    def told_by_torque(self, dt: float) -> bool:
+        """Whether a log with the sample time dt [s] has a line for each sample of what is no bare PI: its torque tells all that
+        this controller did."""
+        return not self.one_equation and self.log_every(dt) == 1
+
     def line_equation(self, log: LoopSignals, poles: int) -> bool:
         """Whether one difference equation takes a log that starts at rest from line to line, although it samples faster.
 

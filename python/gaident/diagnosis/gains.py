@@ -94,7 +94,7 @@ def measured_gains(
     part: tuple[int, ...] | None
     if validation:
         scored, words, part = [(r, 0) for r in validation], "validation records", None
-    elif all(len(r) >= POLICY.least_held for r in records):
+    elif all(len(r) >= POLICY.least_held_out for r in records):
         scored = [(r, held_out_from(r)) for r in records]
         part = tuple(first for _, first in scored)
         by_time = all(first == int(POLICY.fitted_share * len(r)) for r, first in scored)
@@ -171,9 +171,8 @@ def closed_over(controller: Controller | None, records: Sequence[Record], effect
     """
     if controller is None or controller.one_equation:
         return controller
-    slower = any(controller.log_every(r.dt) > 1 for r in records)
-    impacts = any(LIBRARY[e].multimodal and LIBRARY[e].in_coupling for e in effects if e in LIBRARY)
-    return controller if (slower or impacts) and not any(starts_moving(r, None) for r in records) else None
+    told = all(controller.told_by_torque(r.dt) for r in records) and not any(LIBRARY[e].impacts for e in effects if e in LIBRARY)
+    return None if told or any(starts_moving(r, None) for r in records) else controller
 
 
 def _turned(rec: Record, controller: Controller | None, final: Fit) -> Record:
@@ -196,7 +195,7 @@ def held_out_from(rec: Record) -> int:
     """The first sample that is held out: of the last 30 % of the time or, where these hardly move, of the path."""
     at = int(POLICY.fitted_share * len(rec))
     before, after = (float(np.sqrt(np.mean(w**2))) for w in (rec.velocity[:at], rec.velocity[at:]))
-    if after < POLICY.held_motion * before:
+    if after < POLICY.held_out_motion * before:
         path = np.cumsum(np.abs(rec.velocity))
         at = int(np.clip(np.searchsorted(path, POLICY.fitted_share * path[-1]), POLICY.least_fitted * len(rec), at))
     return at

@@ -110,7 +110,8 @@ class Work:
             t: np.array(list(limits[t.name].values())) for t in in_controller() if t.name in limits
         }
         shown = self.at_controller.controller or self.controller
-        self.follows = self.at_controller.follows and not (data.slower and self.driving.in_doubt)
+        missing = bool(known) and data.told_by_torque and shown is self.controller  # a limit that its simulated loop would lack
+        self.follows = self.at_controller.follows and not missing and not (data.slower and self.driving.in_doubt)
         data = replace(data, controller=shown, loop_follows=self.follows, known_noise=self.noise, found=self.driving.found)
         self.data = data if self.at_controller.controller is not None else data.with_effects(known)
         self.excited = excitation(

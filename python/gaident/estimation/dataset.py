@@ -193,10 +193,7 @@ class DataSet:
 
     @property
     def left_in_loop(self) -> bool:
-        """Whether the loop is the drive's, so that it drives a model that is left to itself.
-
-        A loop that fits are made in for a measured torque's sake need not be.
-        """
+        """Whether the loop drives a model that is left to itself: it is the drive's, not there for a measured torque's sake."""
         return self.fits_in_loop and self.loop_follows
 
     @cached_property
@@ -218,7 +215,7 @@ class DataSet:
 
     @cached_property
     def loop(self) -> Controller | None:
-        """What a simulated loop is closed over; None: the torque drives the model."""
+        """What a simulated loop is closed over; None without a controller."""
         return None if self.controller is None else self.older(self.controller)
 
     @property
@@ -242,6 +239,11 @@ class DataSet:
         commands = [(r, t, r.velocity + filtered(b, a, torque_in(d)[None, :], [len(d)])[0]) for r, d, t in pairs]
         records, turned = (tuple(part[i].with_channels(command=part[2]) for part in commands) for i in (0, 1))
         return replace(self, controller=own, records=records, turned=turned)
+
+    @property
+    def told_by_torque(self) -> bool:
+        """See `Controller.told_by_torque`; False without a controller."""
+        return self.controller is not None and self.controller.told_by_torque(self.dt)
 
     @property
     def slower(self) -> bool:

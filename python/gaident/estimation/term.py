@@ -120,6 +120,11 @@ class Term:
         return self.limiting is not None
 
     @property
+    def impacts(self) -> bool:
+        """Whether masses hit each other through it: a gap, or a coupling that is hard somewhere."""
+        return self.multimodal and self.in_coupling
+
+    @property
     def in_series(self) -> bool:
         """Whether it is linear: a delay, a lag, a filter or a resonance between the torque and the measured velocity."""
         return not (self.domains or self.harmonic or self.in_controller)

@@ -50,7 +50,7 @@ def _covariance(objective: Objective, fit: Fit) -> Matrix:
 
 def _of_the_errors(objective: Objective, fit: Fit) -> Matrix:
     cov = _at_one_point(objective, fit)
-    if not any(t.multimodal and t.in_coupling for t in fit.parameters.terms):
+    if not any(t.impacts for t in fit.parameters.terms):
         return cov
     local = np.sqrt(np.diag(cov))
     known = (local > 0.0) & np.isfinite(local)

@@ -29,6 +29,7 @@ from gaident.control.controller import Controller
 from gaident.control.found import FoundNumbers
 from gaident.data.record import Record
 from gaident.data.signals.lattice import rounding_step
+from gaident.data.torque_kind import MEASURED
 from gaident.errors import GaidentError
 from gaident.identification.controller_numbers import with_estimates
 from gaident.identification.logged_stretches import Log, centred, correlation, log_of, whitened
@@ -86,7 +87,9 @@ def _off(rec: Record, controller: Controller) -> float:
         return float(np.sqrt(np.mean(centred(*whitened(d, log.stretch, rho), False) ** 2)))
 
     possible = float(np.sqrt(sum(rms(other, rho) ** 2 for other in others)))
-    noise = noise_std(left, rounding_step(log.torque))  # of a measured, or rounded, torque
+    step = rounding_step(log.torque)
+    # A commanded torque is the controller's own number, as far as the log's decimals go: what is rough in the rest is no noise.
+    noise = noise_std(left, step) if rec.torque_is == MEASURED else step / float(np.sqrt(12.0))
     measured = min(noise, POLICY.replay_noise * float(np.std(log.torque)))
     off, size = rms(left, 0.0), float(np.sqrt(np.mean(log.torque**2)))
     follows = (

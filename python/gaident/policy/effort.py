@@ -44,6 +44,7 @@ class Effort:
     final: int = effort(60, "iterations", "of the last fit, of the model or of the controller, whose numbers are told")
     regressions: int = effort(50, "regressions", "of a discrete model, each filtered by the noise model of the one before")
     evolution: int = effort(50, "generations", "of a global search beside stops and impacts")
+    deepenings: int = effort(12, "searches", "of that kind near the model that was selected, until they gain no more")
     population: int = effort(6, "1", "members of that search for each number that it moves")
 
     # Starts and points of a grid.

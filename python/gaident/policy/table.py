@@ -89,7 +89,7 @@ class Decisions:
     harm: float = gain(0.02, "1", "part of the held-out error that an effect may add before it is refused", REAL)
     fitted_share: float = gain(0.7, "1", "part of a record to which parameters are fitted where the rest is held out", REAL)
     least_fitted: float = gain(0.25, "1", "the same at least, where the cut follows the path because the end hardly moves", REAL)
-    least_held: int = gain(600, "samples", "length of a record from which a part of it is held out", REAL)
+    least_held_out: int = gain(600, "samples", "length of a record from which a part of it is held out", REAL)
     interval_level: float = gain(
         0.05, "probability", "outside the interval of a fall of the error: below 0 as a whole, it is harm", REAL
     )
@@ -97,7 +97,7 @@ class Decisions:
         2.5, "1", "length of the blocks of a bootstrap, in correlation times of the error; shorter ones hide how slow it is", REAL
     )
     least_blocks: int = gain(8, "1", "blocks that a bootstrap has at least: fewer tell no interval", REAL)
-    held_motion: float = gain(0.33, "1", "rms speed of the held-out end over that before: below, the cut follows the path", REAL)
+    held_out_motion: float = gain(0.33, "1", "rms speed of the held-out end over that before: below, the path is cut", REAL)
     told_apart: float = gain(
         25.0, "chi2", "from which a proposed experiment tells two explanations apart: 5 standard deviations of one number", DRIVES
     )

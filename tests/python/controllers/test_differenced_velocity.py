@@ -16,6 +16,7 @@ import gaident as ga
 from drive_rig import Array, Noise, Plant, rig, skip_without_library
 from gaident.control.differencing import differencing
 from gaident.diagnosis.controller.replay import replay
+from gaident.diagnosis.gains import closed_over
 
 skip_without_library()
 
@@ -109,3 +110,34 @@ def test_torques_that_are_alike_at_the_top_are_no_limit_where_the_rule_alone_mak
     """The largest five torques are alike to a thousandth, which an anti-windup at a limit there makes as exactly."""
     said = replay(behind_a_current_loop(0), ga.PI(0.12, 6.0))
     assert said.cause == "integration_rule" and "limit" not in said.sentence
+
+
+@pytest.mark.parametrize("first", [0, 150])
+def test_its_age_is_asked_in_motion_too_where_the_torque_of_each_sample_is_logged(first: int) -> None:
+    controller = ga.PI(0.1, 5.0, rule="backward")
+    plant = Plant(J=4e-4, D=0.002, kp=0.1, ki=5.0, dt=0.5e-3, cascade=ga.Cascade(controller, period=0.5e-3))
+    levels = np.repeat(np.random.default_rng(1).uniform(-60.0, 60.0, 16), 200)
+    log = rig(plant, levels, {}, Noise(white=0.0, encoder=2 * np.pi / 5000.3, differenced=True), seed=1)
+    assert ga.diagnose(log[first:], controller).causes == ()
+
+
+def test_what_a_controller_limits_is_no_candidate_where_its_torque_drives_the_model() -> None:
+    """Without a command nothing replays it, and nothing simulates its loop."""
+    controller = ga.PI(0.1, 5.0, rule="backward")
+    plant = Plant(J=4e-4, D=0.002, kp=0.1, ki=5.0, dt=0.5e-3, cascade=ga.Cascade(controller, period=0.5e-3))
+    levels = np.repeat(np.random.default_rng(1).uniform(-60.0, 60.0, 8), 200)
+    log = rig(plant, levels, {"coulomb_friction": {"torque": 0.05}}, Noise(white=0.01), seed=1)
+    dia = ga.diagnose(log.with_channels(command=None), controller)
+    assert [f.effect for f in dia.causes] == ["coulomb_friction"]
+
+
+def test_free_runs_are_closed_over_what_the_torque_does_not_tell() -> None:
+    log = ga.Record(T, command=command(False), velocity=np.zeros(600), torque=np.zeros(600))
+    moving = ga.Record(T, command=command(False), velocity=20.0 * np.cos(np.arange(600) / 50.0), torque=np.ones(600))
+    bare, other = ga.PI(KP, KI), ga.PI(KP, KI, rule="backward")
+    faster = ga.Cascade(other, period=T / 4)
+    assert closed_over(None, [log]) is None
+    assert closed_over(bare, [log]) is bare and closed_over(bare, [moving]) is bare
+    assert closed_over(other, [log]) is None and closed_over(other, [log], ["coulomb_friction"]) is None
+    assert closed_over(other, [log], ["backlash"]) is other and closed_over(other, [moving], ["backlash"]) is None
+    assert closed_over(faster, [log]) is faster and closed_over(faster, [moving]) is None

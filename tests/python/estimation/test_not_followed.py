@@ -20,6 +20,7 @@ from gaident.estimation import least_squares as ls
 from gaident.estimation.dataset import DataSet
 from gaident.estimation.noise_model import WHITE
 from gaident.estimation.objective import Objective
+from gaident.policy.table import POLICY
 
 DT, GAINS = 1e-3, ga.PI(kp=0.05, ki=1.5)
 
@@ -135,6 +136,7 @@ def test_a_search_with_an_encoders_age_is_made_whole_only_where_fewer_effects_ma
     monkeypatch.setattr(sensor_age, "encoder_step", lambda velocity, linear: 0.01)
     monkeypatch.setattr(sensor_age, "encoder_lines", lambda velocity, dt, turn: 0)
     monkeypatch.setattr(sensor_age, "_score_beside", lambda again, found: again.final.score)
+    monkeypatch.setattr(sensor_age, "_better_if_older", lambda found, older: False)
     model, scales = ga.OneMass(J=3e-4, D=2e-3).model(), scales_of(objective.data)
     for older, whole, taken in (
         ({0: (0, 5.0)}, False, False),  # worse without effects: no whole search
@@ -145,6 +147,17 @@ def test_a_search_with_an_encoders_age_is_made_whole_only_where_fewer_effects_ma
         found, notes = sensor_age.searched(objective, scales, model, search)
         assert search.asked == [(False, 4), (True, 0), *[(True, 4)] * whole]
         assert bool(notes) is taken and len(found.final.effects) == (0 if taken else 1)
+    monkeypatch.setattr(sensor_age, "_better_if_older", lambda found, older: True)
+    margin = POLICY.rival_margin
+    for effects, score, taken in (
+        (1, -1.1 * margin, True),
+        (1, -0.9 * margin, False),
+        (0, -1.0, True),
+        (2, -99.0 * margin, False),
+    ):
+        search = Searches((1, 0.0), {4: (effects, score)})
+        found, notes = sensor_age.searched(objective, scales, model, search)
+        assert search.asked == [(False, 4), (True, 4)] and bool(notes) is taken
 
 
 @pytest.mark.parametrize(("logged", "follows", "every"), [(True, False, 1), (True, True, 1), (False, False, 1), (True, False, 2)])
@@ -157,7 +170,13 @@ def test_a_logged_torque_that_does_not_follow_from_its_controller_may_go_on_betw
     read = tuple(r.with_channels(torque=r.velocity if logged else None) for r in data.records)
     period = ga.Cascade(GAINS, period=DT / every) if every > 1 else GAINS
     data = replace(data, read=read, controller=period, loop_follows=follows)
-    for name, found in (("_ahead", None), ("encoder_lines", 0), ("encoder_step", 0.01), ("_score_beside", 9.0)):
+    for name, found in (
+        ("_ahead", None),
+        ("_better_if_older", False),
+        ("encoder_lines", 0),
+        ("encoder_step", 0.01),
+        ("_score_beside", 9.0),
+    ):
         monkeypatch.setattr(sensor_age, name, lambda *arguments, found=found: found)
     search = Searches((1, 0.0), {0: (0, 5.0)})
     model = ga.OneMass(J=3e-4, D=2e-3).model()

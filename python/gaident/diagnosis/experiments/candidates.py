@@ -46,12 +46,13 @@ def candidates(
         behind = say("the {torque} was measured behind the actuator, which it does not show")
         why |= {t.name: behind for t in LIBRARY.values() if t.place == "actuator"}
     inside = [t.name for t in LIBRARY.values() if t.in_controller]
-    if data.loop is None:  # of a controller whose loop is not simulated the replay has decided
+    outside = data.controller is None or data.told_by_torque  # what the controller did stands in its torque: the replay decides
+    if outside:
         why = {name: reason for name, reason in why.items() if name not in at.decided}
     elif data.slower and not data.fits_in_loop:
         still = Text("a record starts in motion, and the loop of this controller is simulated from rest only")
         if not data.loop_follows:
             still = say("the logged {torque} does not follow from this controller, so that no loop is simulated")
         why |= dict.fromkeys(inside, still)
-    out = {*why, *at.decided, *decided_by_the_angle(clean), *(inside if data.loop is None else ())}
+    out = {*why, *at.decided, *decided_by_the_angle(clean), *(inside if outside else ())}
     return [t for t in LIBRARY.values() if t.name not in out], why

@@ -160,7 +160,7 @@ class ModelSpace:
         Beside impacts the part is larger: one impact more or less leaves an error even with the true parameters, which other
         effects can fit.
         """
-        impacts = any(t.multimodal and t.in_coupling for t in simpler.parameters.terms)
+        impacts = any(t.impacts for t in simpler.parameters.terms)
         if self.quiet(fuller) and not impacts:
             return True
         noise = self.objective.count * self.noise_beside(fuller) ** 2
@@ -279,12 +279,19 @@ class ModelSpace:
         if fit.predictor.closed and self.whitens and not self.data.loop_only:
             # Parameters found in closed loop may be a good start for the open loop, whose errors show more.
             predictors.append(OpenLoop(self.data, fit.predictor.own_angle))
-            if ObserverLoop.possible(self.data) and any(t.multimodal and t.in_coupling for t in fit.parameters.terms):
+            if ObserverLoop.possible(self.data) and any(t.impacts for t in fit.parameters.terms):
                 predictors.append(ObserverLoop(self.data, fit.predictor.own_angle))
         if not fit.predictor.own_angle and not self.data.angle_logged and any(t.harmonic for t in fit.parameters.terms):
             predictors.append(replace(fit.predictor, own_angle=True))  # type: ignore[type-var]
         best = min((fit, *(self.predicted_by(fit, p) for p in predictors)), key=lambda f: f.bic)
         return self.canonical(best)
+
+    def bare(self, fit: Fit) -> Fit:
+        """The linear part of a model, fitted without its effects."""
+        hypothesis, x = fit.hypothesis, fit.x
+        for e in fit.effects:
+            x, hypothesis = hypothesis.parameters.removed(x, e), hypothesis.without(e)
+        return self.refitted(hypothesis, x)
 
     def canonical(self, fit: Fit) -> Fit:
         """One mass with an extra resonance is a drive of two masses: part of the linear model, not an effect."""
@@ -292,3 +299,26 @@ class ModelSpace:
             return fit
         hypothesis, x = as_two_masses(fit)
         return self.continued(hypothesis, fit, x)
+
+    def evolved(self, fit: Fit) -> Fit:
+        """A global search nearby, in the loop where there is one."""
+        predictor = self.closed(fit.predictor) if self.data.fits_in_loop else fit.predictor
+        start = replace(fit, hypothesis=fit.hypothesis.driven_by(predictor))
+        key = "evolved", start.key, self.policy.evolution
+        return self.objective.once(key, lambda: self.finished(ls.evolved(self.objective, start, self.policy.evolution)))
+
+    def deepened(self, fit: Fit) -> Fit:
+        """A model with impacts, searched globally nearby until that brings no more.
+
+        Each impact more or less is a valley of the cost, also where the errors are as small as the noise that the velocity shows.
+        """
+        if not any(t.impacts for t in fit.parameters.terms):
+            return fit
+        for _ in range(self.policy.deepenings):
+            found = self.evolved(fit)
+            found = min((found, self.refitted(found.hypothesis, found.x, self.policy.long)), key=self.score)
+            gained = self.score(fit) - self.score(found)
+            fit = found if gained > 0.0 else fit
+            if gained <= self.margin:
+                break
+        return fit

@@ -261,7 +261,7 @@ class Moves(SideMoves):
         for term in [t for t in hypothesis.parameters.terms if not t.stands_with(hypothesis.effects)]:
             hypothesis, x = _nested(hypothesis, x, term, LIBRARY[term.nested[0]])
         less = self.continued(hypothesis, fit, x)
-        if any(t.multimodal and t.in_coupling for t in less.parameters.terms) and self.data.fits_in_loop and not self.quiet(less):
+        if any(t.impacts for t in less.parameters.terms) and self.data.fits_in_loop and not self.quiet(less):
             less = min((less, self.evolved(less)), key=lambda f: f.bic)
         return less
 
@@ -374,29 +374,6 @@ class Moves(SideMoves):
         tries = [ls.scored(self.objective, ls.fit(self.objective, fit.hypothesis, X[i], WHITE, self.policy.usual)) for i in order]
         best = min(tries, key=lambda f: f.bic)
         return self.refitted(best.hypothesis, best.x)
-
-    def evolved(self, fit: Fit) -> Fit:
-        """A global search nearby, in the loop where there is one."""
-        predictor = self.closed(fit.predictor) if self.data.fits_in_loop else fit.predictor
-        start = replace(fit, hypothesis=fit.hypothesis.driven_by(predictor))
-        key = "evolved", start.key, self.policy.evolution
-        return self.objective.once(key, lambda: self.finished(ls.evolved(self.objective, start, self.policy.evolution)))
-
-    def deepened(self, fit: Fit) -> Fit:
-        """A model with impacts, searched globally nearby until that brings no more.
-
-        Each impact more or less is a valley of the cost, also where the errors are as small as the noise that the velocity shows.
-        """
-        if not any(t.multimodal and t.in_coupling for t in fit.parameters.terms):
-            return fit
-        for _ in range(self.policy.usual):
-            found = self.evolved(fit)
-            found = min((found, self.refitted(found.hypothesis, found.x, self.policy.long)), key=self.score)
-            gained = self.score(fit) - self.score(found)
-            fit = found if gained > 0.0 else fit
-            if gained <= self.margin:
-                break
-        return fit
 
     def valleys(self, base: Fit) -> list[Fit]:
         """Each multimodal effect alone beside a base, by a global search."""

@@ -101,8 +101,7 @@ def selected(
     task = task.under(Innovations(floor=noise_floor(task, one)))
     blocks = blocks_of(task.data, error)
     if blocks == 1:
-        found = _decided(task, note)
-        return _compared(found.of(found.space.deepened(found.final)), classes, note)
+        return _compared(_decided(task, note), classes, note)
     grid = decimated_objective(task.objective, blocks)
     coarse_scales = replace(scales, dt=task.data.dt * blocks, blocks=blocks)
     outside = tuple(t for t in task.allowed if not t.in_controller)
@@ -110,7 +109,7 @@ def selected(
     found = _on_all_samples(task, outline, note)
     if task.data.fits_in_loop and not (found.space.is_noise(found.final) and found.space.small_unwhitened(found.final)):
         found = _searched_whole(task, found, note)
-    return _compared(found.of(found.space.deepened(found.final)), classes, note)
+    return _compared(found, classes, note)
 
 
 @dataclass(frozen=True, eq=False)
@@ -125,7 +124,7 @@ class _Found:
 
     def of(self, final: Fit) -> _Found:
         """The same with another model, and its linear part."""
-        base = self.base if self.base.parameters.kind == final.parameters.kind else _bare(self.space, final)
+        base = self.base if self.base.parameters.kind == final.parameters.kind else self.space.bare(final)
         return replace(self, base=base, final=final)
 
 
@@ -150,7 +149,7 @@ def _decided(task: Task, note: Callable[[str], None]) -> _Found:
     if again is not None and again.effects and space.is_noise(again) and space.small_unwhitened(again):
         # It leaves noise: no other way to explain the same is followed, and what it may lack is looked for from there.
         final = _beam(space).run([reduced_by(again, _reductions(space), space.prefers, space.score)])
-        base = _bare(space, final)
+        base = space.bare(final)
     else:
         base, final = _explored(task, space, bases)
     test = specification(space, task, final)
@@ -159,7 +158,7 @@ def _decided(task: Task, note: Callable[[str], None]) -> _Found:
     if by_output is not None:
         better = _improved(space, again or _as_innovations(space, by_output.final), final)
         if better is not final:
-            base, final = _bare(space, better), better
+            base, final = space.bare(better), better
         test = specification(space, task, final)
         by_output = _offered(by_output, final)
     whitened = _Found(space, base, final, test)
@@ -317,11 +316,11 @@ def _on_all_samples(task: Task, outline: _Found, note: Callable[[str], None]) ->
     base, final = (_moved(space, task.scales, f) for f in (outline.base, outline.final))
     final = reduced_by(final, _reductions(space), space.prefers, space.score)
     note(f"looking beyond {words(final.effects) or 'the linear model'}, at all samples")
-    # What acts within a step of the coarse grid, it can only show as a resonance: all samples are asked without that one first.
-    without = [space.without(final, t.name) for t in final.parameters.terms if t.resonates]
-    without += space.demoted(final) if resonance(final) * outline.space.data.dt > 1.0 else []
-    without = [_beam(space).run([f]) for f in without]
-    final = _beam(space).run([final]) if not without or space.score(final) < space.score(without[0]) else without[0]
+    # What acts within a step of the coarse grid, it can only show as a resonance: all samples are asked without that one, too.
+    ways = [final, *(space.without(final, t.name) for t in final.parameters.terms if t.resonates)]
+    if resonance(final) * outline.space.data.dt > 1.0:  # no decision: a time constant 1/w that is shorter than a step
+        ways += space.demoted(final)
+    final = min((_beam(space).run([f]) for f in ways), key=space.score)
     test = specification(space, task, final) if space.whitens else outline.specification
     return _Found(space, base, base, test).of(final)
 
@@ -329,13 +328,12 @@ def _on_all_samples(task: Task, outline: _Found, note: Callable[[str], None]) ->
 def _searched_whole(task: Task, found: _Found, note: Callable[[str], None]) -> _Found:
     """The search over all samples, in the loop, and what the coarse grid led to where that scores better there.
 
-    A controller samples as it does: on a coarse grid its torque drives the model, and what stops or hits something runs away from
-    the record.
+    On a coarse grid the controller's torque drives the model, and what stops or hits something runs away from the record.
     """
     note("searching all samples, in the loop")
     whole = _decided(task, note)
-    space = whole.space
-    better = _improved(space, space.refitted(found.final.hypothesis.over(space.data), found.final.x), whole.final)
+    other = whole.space.refitted(found.final.hypothesis.over(whole.space.data), found.final.x)
+    better = _improved(whole.space, other, whole.final)
     return whole if better is whole.final else whole.of(better)
 
 
@@ -344,17 +342,9 @@ def _moved(space: Moves, scales: Scales, fit: Fit) -> Fit:
     return space.refitted(start.hypothesis, start.x)
 
 
-def _bare(space: Moves, final: Fit) -> Fit:
-    """The linear part of a model, fitted without its effects."""
-    hypothesis, x = final.hypothesis, final.x
-    for e in final.effects:
-        x, hypothesis = hypothesis.parameters.removed(x, e), hypothesis.without(e)
-    return space.refitted(hypothesis, x)
-
-
 def _compared(found: _Found, classes: Classes, note: Callable[[str], None]) -> Selection:
-    """With the rivals of every effect; a better one takes the place, and all are compared again."""
-    space, final = found.space, found.final
+    """In the deepest valley near by, with the rivals of each effect; a better one takes its place, and all are compared again."""
+    space, final = found.space, found.space.deepened(found.final)
     for swaps_left in range(POLICY.swaps, -1, -1):
         rivals, better = _rivals(space, final, swaps_left > 0, classes, note)
         if better is not None and space.hidden(better, final):
@@ -362,7 +352,7 @@ def _compared(found: _Found, classes: Classes, note: Callable[[str], None]) -> S
         if better is None:
             break
         final = reduced_by(space.canonical(better), _reductions(space), space.prefers, space.score)
-    base = found.base if found.base.parameters.kind == final.parameters.kind else _bare(space, final)
+    base = found.base if found.base.parameters.kind == final.parameters.kind else space.bare(final)
     return Selection(space, base, final, rivals, found.specification, found.whitened)
 
 

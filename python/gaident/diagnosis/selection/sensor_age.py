@@ -66,7 +66,7 @@ def searched(
     most = POLICY.most_effects
     data = objective.data
     controller = data.controller
-    if controller is not None and (controller.loop == "continuous" or (data.loop is not None and any(data.moving))):
+    if controller is not None and (controller.loop == "continuous" or (any(data.moving) and not data.told_by_torque)):
         return search(objective, most), []
     every = 1 if controller is None else controller.log_every(data.dt)
     if every == 1 and (ahead := _ahead(data, model)) is not None:
@@ -114,17 +114,13 @@ def searched(
     step = encoder_step(data.velocity, data.axis == "linear") if in_series else 0.0
     if not step > 0.0:
         return found, []
-    # Half a sample costs nothing: a model with fewer effects takes the place, or one that is better by the margin of two rivals.
-    # First whether there is one, then what the whole search ends with.
-    for allowed in (len(found.final.effects) - 1, most):
+    # First whether fewer effects may do, unless the model itself is better so; then what the whole search ends with.
+    limits = (most,) if _better_if_older(found, older) else (len(found.final.effects) - 1, most)
+    for allowed in limits:
         again = search(older, allowed)
         if not _better(again, found):
-            break
-    else:
-        return again, [_on_a_lattice(step, age)]
-    if _late_otherwise(found, older) and _better(again := search(older, most), found):
-        return again, [_on_a_lattice(step, age)]
-    return found, []
+            return found, []
+    return again, [_on_a_lattice(step, age)]
 
 
 def _on_a_lattice(step: float, age: float) -> Text:
@@ -136,13 +132,13 @@ def _on_a_lattice(step: float, age: float) -> Text:
 
 
 def _better(again: Selection, found: Selection) -> bool:
-    """Whether the model of one search takes the place of that of another, which was under a velocity of age 0."""
-    fewer = len(again.final.effects) < len(found.final.effects)
-    margin = 0.0 if fewer else POLICY.rival_margin
-    return _score_beside(again, found) < found.space.score(found.final) - margin
+    """Whether the model of a search under older velocities takes the place: with fewer effects, or with as many by the margin."""
+    more = len(again.final.effects) - len(found.final.effects)
+    margin = POLICY.rival_margin if more == 0 else 0.0
+    return more <= 0 and _score_beside(again, found) < found.space.score(found.final) - margin
 
 
-def _late_otherwise(found: Selection, older: Objective) -> bool:
+def _better_if_older(found: Selection, older: Objective) -> bool:
     """Whether a model without one of its lags and delays, or with another one there, is better over the older velocities by the
     margin of two rivals."""
     space, final = found.space, found.final
