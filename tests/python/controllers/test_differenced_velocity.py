@@ -133,7 +133,7 @@ def test_what_a_controller_limits_is_no_candidate_where_its_torque_drives_the_mo
 
 def test_free_runs_are_closed_over_what_the_torque_does_not_tell() -> None:
     log = ga.Record(T, command=command(False), velocity=np.zeros(600), torque=np.zeros(600))
-    moving = ga.Record(T, command=command(False), velocity=20.0 * np.cos(np.arange(600) / 50.0), torque=np.ones(600))
+    moving = ga.Record(T, command=command(False), velocity=20.0 * np.cos(np.arange(600) / 50.0), torque=np.sin(np.arange(600.0)))
     bare, other = ga.PI(KP, KI), ga.PI(KP, KI, rule="backward")
     faster = ga.Cascade(other, period=T / 4)
     assert closed_over(None, [log]) is None
