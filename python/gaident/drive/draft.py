@@ -310,7 +310,11 @@ class _Draft:
         return [
             mark("# kp = 0.0232", "controller.kp", f"{unit('N m s/rad', self.axis)}; proportional gain {text}"),
             mark("# ki = 1.367", "controller.ki", f"{unit('N m/rad', self.axis)}; integral gain"),
-            *([gain] if positioned else []),
+            *(
+                [gain, _line('# velocity_feedforward = "100 %"', "also acceleration_feedforward, position_period")]
+                if positioned
+                else []
+            ),
             _line('# loop = "sampled"', f'a digital drive; or "continuous"; or "open": the {torque} drives the model'),
             _line('# rule = "backward"', 'of the integral, or "forward"; left out: "trapezoidal"'),
             _line("# torque_limit = 2.4", "a known limit of the controller, and integrator_limit"),

@@ -149,8 +149,7 @@ class DataSet:
         return max(substeps // 2, 1) if self.differenced and substeps is not None else substeps  # no decision: half a sample
 
     @property
-    def differenced(self) -> bool:
-        """Whether the velocity is the difference of the angle from each line of the log to the next."""
+    def differenced(self) -> bool:  # the velocity is the difference of the angle from each line of the log to the next
         return self.age == 0.5  # no decision: a mean over a line is half of it old
 
     @property
@@ -200,12 +199,13 @@ class DataSet:
     def simulates_loop(self) -> bool:
         """Whether command and controller can drive a model from standstill, with what the integrator stored.
 
-        Never where they do not make the logged torque; a measured one, which has noise and an error of its own, shows that less.
+        Never where they do not make the logged torque, which a measured one shows less, or where it tells all and is not checked.
         """
-        if self.loop is None or any(self.moving) or not (self.loop_follows or (self.torque_measured and not self.slower)):
-            return False
         loop = self.loop
-        return all(loop.command_of(r) is not None for r in self.records)
+        if loop is None or any(self.moving) or not (self.loop_follows or (self.torque_measured and not self.slower)):
+            return False
+        checked = not self.told_by_torque or all(loop.replayable(r) for r in self.read or self.records)
+        return checked and all(loop.command_of(r) is not None for r in self.records)
 
     @cached_property
     def stored(self) -> tuple[float, ...]:
@@ -242,7 +242,7 @@ class DataSet:
 
     @property
     def told_by_torque(self) -> bool:
-        """See `Controller.told_by_torque`; False without a controller."""
+        """See `Controller.told_by_torque`."""
         return self.controller is not None and self.controller.told_by_torque(self.dt)
 
     @property
