@@ -180,7 +180,9 @@ def diagnose(
                 break
             linear = linear if work.driving.regained_from is not None else work.idn  # a name needs more than one effect here
         driving = work.driving
-        result = replace(found, noise=noise_std, bootstrap=bootstrap, controller_numbers=driving.numbers)
+        result = replace(
+            found, noise=noise_std, bootstrap=bootstrap, controller_numbers=driving.numbers, velocity_age=work.data.age
+        )
         result = driving.moved.noted(result)
         if result.relevance is not None:
             velocity, torque = (asked_accuracy.get(name) for name in ("velocity", "torque"))

@@ -10,7 +10,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gaident.axis import message_of, say
-from gaident.control.controller import Controller
 from gaident.control.pi import bare_pi
 from gaident.data.record import Record
 from gaident.diagnosis.experiments.excitation import position_of
@@ -18,6 +17,7 @@ from gaident.diagnosis.explain.missing_torque import missing_torque
 from gaident.diagnosis.gains import IN_SAMPLE, closed_over, free_run_errors, held_out_from
 from gaident.diagnosis.records.hygiene import cleaned, outliers
 from gaident.errors import GaidentError
+from gaident.estimation.dataset import DataSet
 from gaident.models.drive_torque import torque_of
 from gaident.models.model import Model
 from gaident.models.simulate import run
@@ -45,9 +45,16 @@ def run_of(result: Diagnosis | Identification, rec: Record) -> RecordView:
         elif used == "fitted" and not result.validation_digests and result.held_out != IN_SAMPLE:
             first_held_out = held_out_from(rec)
         closed = closed_over(result.controller, (rec,), [e.name for e in result.model.effects])
-        before = _free_run(result.identification.model, rec, closed, "linear", notes)
+        aged = DataSet.of([rec], result.controller).aged(result.velocity_age)
+        driven = rec if closed is not None else aged.as_old(rec)
+
+        def free_run(model: Model, what: str) -> Vector:
+            (error,) = free_run_errors(model, [(driven, 0)], aged.older(closed), closed)
+            return _finite(rec.velocity - error, rec, what, notes)
+
+        before = free_run(result.identification.model, "linear")
         if result.model.effects:
-            extended = _free_run(result.model, rec, closed, "extended", notes)
+            extended = free_run(result.model, "extended")
     else:
         before = _finite(result.simulate(rec), rec, "linear", notes)
     simulated = rec.torque is None and result.controller is not None and loop is None
@@ -76,11 +83,6 @@ def run_of(result: Diagnosis | Identification, rec: Record) -> RecordView:
         held_out_from=first_held_out,
         notes=tuple(notes),
     )
-
-
-def _free_run(model: Model, rec: Record, controller: Controller | None, what: str, notes: list[str]) -> Vector:
-    (error,) = free_run_errors(model, [(rec, 0)], controller)
-    return _finite(rec.velocity - error, rec, what, notes)
 
 
 def _finite(velocity: Vector, rec: Record, what: str, notes: list[str]) -> Vector:

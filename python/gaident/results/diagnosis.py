@@ -98,6 +98,8 @@ class Diagnosis(SavedResult):
         Effect that was tested and not found -> which sizes of it would not have shown in these records.
     mechanics : mapping of str to Estimate
         Mechanical parameters of the linear part, fitted together with the effects.
+    velocity_age : float
+        Lines of the log by which the measured velocity is older than the torque: 0.5 where it is an encoder's difference.
     log_shifts : mapping of str to mapping of str to int
         Digest of a record -> channel -> samples by which it was moved, as `Record.shifted` takes them, where the log wrote
         channels on different lines; `as_used` does it again.
@@ -154,6 +156,7 @@ class Diagnosis(SavedResult):
     line: tuple[float, float] | None = None
     one_sided: Mapping[str, str] = field(default_factory=dict, hash=False)
     mechanics: Mapping[str, Estimate] = field(default_factory=dict, hash=False)
+    velocity_age: float = 0.0
     log_shifts: Mapping[str, Mapping[str, int]] = field(default_factory=dict, hash=False)
     regression: InverseDynamics | None = None
     regression_force_error: float | None = None
@@ -321,6 +324,7 @@ class Diagnosis(SavedResult):
             "loop_follows": self.loop_follows,
             "line": None if self.line is None else list(self.line),
             "one_sided": dict(self.one_sided),
+            "velocity_age": self.velocity_age,
             "log_shifts": {digest: dict(moves) for digest, moves in self.log_shifts.items()},
             "mechanics": {n: asdict(e) for n, e in self.mechanics.items()},
             "regression": None if self.regression is None else self.regression.to_dict(),
@@ -377,6 +381,7 @@ class Diagnosis(SavedResult):
                 torque_logged=data.get("torque_logged", False),
                 loop_follows=data.get("loop_follows", True),
                 line=None if data.get("line") is None else (data["line"][0], data["line"][1]),
+                velocity_age=data.get("velocity_age", 0.0),
                 log_shifts=data.get("log_shifts", {}),
                 one_sided={effect: restored(sizes, linear) for effect, sizes in data.get("one_sided", {}).items()},
                 mechanics={n: Estimate(**e) for n, e in data.get("mechanics", {}).items()},

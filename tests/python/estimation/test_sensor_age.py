@@ -20,6 +20,7 @@ from gaident.estimation.mean_velocity import means, with_middles
 from gaident.estimation.noise_model import WHITE
 from gaident.estimation.objective import Objective
 from gaident.models.drive_torque import late
+from gaident.reporting.runs import run_of
 
 T, LINES = 0.5e-3, 2**20
 DRIVE = Plant(J=3e-4, D=1.5e-3, kp=0.06, ki=3.0, dt=T, name="one mass")
@@ -202,3 +203,14 @@ def test_a_linear_scale_has_decimal_lines_and_a_load_beside_it_is_no_friction() 
     rec = rig(axis, speeds, effects, Noise(white=0.0, encoder=1e-7, differenced=True), 1)
     dia = ga.diagnose(rec, axis.controller, axis="linear", seed=1)
     assert {f.effect: f.alternatives for f in dia.causes} == {"load_torque": (), "coulomb_friction": ()}
+
+
+@pytest.mark.parametrize("controller", [ga.PI(0.06, 3.0), None])
+def test_what_is_drawn_has_the_age_and_the_error_of_the_table(controller: ga.PI | None) -> None:
+    rec = record(3, {"torque_lag": {"time_constant": 0.4e-3}})
+    dia = ga.diagnose(rec, controller)
+    assert dia.velocity_age == 0.5 == ga.Diagnosis.from_dict(dia.to_dict()).velocity_age
+    view = run_of(dia, rec)
+    assert view.extended is not None and view.held_out_from is not None
+    error = (view.measured - view.extended)[view.held_out_from :]
+    assert float(np.sqrt(np.mean(error**2))) == pytest.approx(dia.after.rmse, rel=0.05)
