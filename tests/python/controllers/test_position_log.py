@@ -16,6 +16,7 @@ import gaident as ga
 from drive_rig import Plant, run_drive, skip_without_library
 from gaident.cli.main import main
 from gaident.data.signals.difference import backward_difference, is_backward_difference
+from gaident.diagnosis.controller.replay import replay
 
 DT = 0.5e-3
 J, D, FRICTION = 3e-4, 2e-3, 0.05
@@ -137,3 +138,23 @@ def test_a_second_mass_is_found_whose_friction_is_at_the_load(torque: bool) -> N
     found = {name: dia.mechanics[name].value for name in ("motor_inertia", "load_inertia", "stiffness")}
     assert found == pytest.approx({"motor_inertia": 4e-4, "load_inertia": 6e-4, "stiffness": 60.0}, rel=0.01)
     assert dia.verdict == "explained"
+
+
+def test_rounded_positions_are_no_other_controller() -> None:
+    """Differences of positions with the decimals of a log, through a feedforward, in the torque."""
+    dt, degree = 0.25e-3, np.pi / 180.0
+    cascade = ga.Cascade(ga.PI(0.7, 30.0), period=dt, position=ga.P(60.0), velocity_feedforward=1.0)
+    n = np.arange(4000)
+    source = 8.0 * (1.0 - np.cos(2 * np.pi * n / 2000))
+    noise = 1e-3 * np.random.default_rng(1).standard_normal(4000)
+    still = ga.Record(dt, velocity=noise, position=0.0 * source, position_command=source)
+    moved = ga.run(ga.OneMass(J=1.5e-3, D=2e-3).model(), still, cascade)
+    w = moved.velocity + noise
+    log = ga.Record(dt, velocity=w, torque=np.zeros(4000), position=np.cumsum(w) * dt, position_command=source)
+    log = log.with_channels(torque=cascade.torque_of(log))
+    rounded = {c: np.round(getattr(log, c) / degree, 6) * degree for c in ("position", "position_command")}
+    off = log.torque - cascade.torque_of(log.with_channels(**rounded))
+    assert 1e-6 < np.abs(off).max() < 1e-2
+    assert replay(log.with_channels(**rounded), cascade).follows
+    other = ga.Cascade(ga.PI(0.7, 30.0), period=dt, position=ga.P(60.0), velocity_feedforward=0.98)
+    assert not replay(log.with_channels(**rounded), other).follows

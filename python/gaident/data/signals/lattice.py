@@ -7,13 +7,14 @@ from numpy.typing import NDArray
 
 from gaident.policy.table import POLICY
 
-__all__ = ["digits_step", "encoder_lines", "encoder_step", "lattice_step", "rounding_step"]
+__all__ = ["digits_step", "encoder_lines", "encoder_step", "lattice_step", "place_step", "rounding_step"]
 
 Vector = NDArray[np.float64]
 
 FEWEST = 4  # no decision: distinct values that a lattice could be told from chance by
 SAME = 1e-9  # no decision: of the largest value, the last digits of a float, in which two values are the same
 SPEEDS = (1.0, np.pi / 30.0, np.pi / 180.0, 2.0 * np.pi)  # no decision: units of a speed; rad/s in each: rad/s, rpm, deg/s, 1/s
+PLACES = (1.0, np.pi / 180.0, 2.0 * np.pi, 1e-3)  # no decision: units of positions: rad or m, degrees, turns, mm
 EXACT = 1e-4  # no decision: steps, what a decimal number is exact to in binary and scaled by ten
 
 DIGITS = range(1, 10)  # no decision: significant digits that text logs are written with; more round off nothing that matters
@@ -101,6 +102,11 @@ def digits_step(velocities: Vector) -> float:
     A log of fixed decimals has as many significant digits in its largest value.
     """
     return max(unit * _last_digit(velocities / unit) for unit in SPEEDS)
+
+
+def place_step(positions: Vector) -> float:
+    """The step that positions are rounded to [rad or m]: their lattice, or the last digit in rad or m, degrees, turns or mm."""
+    return lattice_step(positions) or max(unit * _last_digit(positions / unit) for unit in PLACES)
 
 
 def _last_digit(values: Vector) -> float:

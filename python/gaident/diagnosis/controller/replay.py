@@ -21,7 +21,7 @@ from gaident.control.cascade import cascade_of
 from gaident.control.controller import Controller, VelocityGains
 from gaident.control.pi import PI, bare_pi
 from gaident.data.record import Record
-from gaident.data.signals.lattice import digits_step, lattice_step, rounding_step
+from gaident.data.signals.lattice import digits_step, lattice_step, place_step, rounding_step
 from gaident.diagnosis.controller.replay_causes import explain, rounded_command, white_noise
 from gaident.errors import RecordError
 from gaident.policy.table import POLICY
@@ -111,9 +111,9 @@ def _compared(rec: Record, command: Vector, controller: Controller, logged: Vect
     rms, maximum = float(np.sqrt(np.mean(off**2))), float(np.abs(off).max())
     figures = (logged, replayed, rms, maximum, resolution)
     head = say("The logged {torque} follows from command and velocity through this controller")
-    found = None
+    found, placed = None, _of_positions(rec, controller, replayed)
     for (step,) in velocity_steps([rec]):
-        allowed = Allowed.of(rec, command, controller.gains, logged, step)
+        allowed = Allowed.of(rec, command, controller.gains, logged, step, placed)
         if allowed(off, None if cascade_of(controller).torque_filters else controller.gains.limits):
             known = say(" (its resolution is {:.2g} {N m})", resolution) if resolution > 0.0 else ""
             return Replay(*figures, True, "", np.nan, None, say("{}, to {:.1g} {N m}{}.", head, maximum, known))
@@ -175,8 +175,8 @@ class Allowed:
     """What a log's rounding makes of a replay, at most.
 
     step: that the log rounds velocities to [rad/s]; it does not round a command more coarsely.
-    torque: steps of the torque's rounding, and what rounded velocity and command do to P part and integral [N m]. Each of N
-    velocities is rounded by itself, a command once for all the samples that it is held; the integrator adds up what is off,
+    torque: steps of the torque's rounding, and what rounded velocity, command and positions do to P part and integral [N m]. Each
+    of N velocities is rounded by itself, a command once for all the samples that it is held; the integrator adds up what is off,
     evenly within +-q/2:
 
         sum of the squares = ki^2 dt^2 (N q_w^2 + sum L_i^2 q_r^2)/12        L_i: samples for which a command is held
@@ -191,12 +191,16 @@ class Allowed:
     jump: float
 
     @classmethod
-    def of(cls, rec: Record, command: Vector, controller: VelocityGains, logged: Vector, step: float) -> Allowed:
+    def of(
+        cls, rec: Record, command: Vector, controller: VelocityGains, logged: Vector, step: float, placed: float = 0.0
+    ) -> Allowed:
         own = POLICY.replay_steps * rounding_step(logged) + ROUNDING * float(np.abs(logged).max())
         at_once, drift = _of_signals(rec, command, controller, step)
         sample = controller.ki * rec.dt * (step + _of_command(command, step))
         error = controller.kp * (command - rec.velocity)
-        return cls(logged, error, own + at_once + POLICY.sum_of_roundings * drift, 2.0 * own + at_once + sample)
+        placed *= POLICY.sum_of_roundings
+        most = own + at_once + POLICY.sum_of_roundings * drift
+        return cls(logged, error, most + placed, 2.0 * own + at_once + sample + placed)
 
     def __call__(self, off: Vector, limits: tuple[float, float] | None, edge: int = 0) -> bool:
         """Whether a replay that is off by so much [N m] (n,), from sample `edge` on, is the logged torque, rounded.
@@ -213,6 +217,21 @@ class Allowed:
         limited = (np.abs(logged) >= POLICY.at_limit * torque) | (np.abs(stored) >= POLICY.at_limit * integral)
         free = ~(limited[1:] | limited[:-1])
         return float(np.abs(np.diff(off))[free].max(initial=0.0)) <= self.jump
+
+
+def _of_positions(rec: Record, controller: Controller, replayed: Vector) -> float:
+    """What rounded positions make of a replayed torque [N m], at most: it is made once more of positions that are off by as much.
+
+    A feedforward takes their differences.
+    """
+    if controller.driven_by != "position_command":
+        return 0.0
+    rng, moved = np.random.default_rng(0), {}
+    for name in ("position_command", "position"):
+        values = getattr(rec, name)
+        if values is not None and (step := place_step(values)) > 0.0:
+            moved[name] = values + step * rng.uniform(-0.5, 0.5, len(values))
+    return float(np.abs(controller.torque_of(rec.with_channels(**moved)) - replayed).max()) if moved else 0.0
 
 
 def _of_command(command: Vector, step: float) -> float:
