@@ -21,7 +21,7 @@ def relevance_words(dia: Diagnosis, axis: str, scales: Scales) -> str:
         return ""
     v, u = velocity_unit(axis), unit("N m", axis)
     torque = word("torque", axis)
-    size = f"{_shown(r.velocity, v, scales)} rms in the velocity"
+    size = f"{_shown(r.velocity, v, scales)} rms in the velocity" if r.velocity else "nothing in the velocity"
     if r.torque is not None:
         size += f" and {_shown(r.torque, u, scales)} rms in the {torque}"
     asked = [

@@ -214,3 +214,18 @@ def test_what_is_drawn_has_the_age_and_the_error_of_the_table(controller: ga.PI 
     assert view.extended is not None and view.held_out_from is not None
     error = (view.measured - view.extended)[view.held_out_from :]
     assert float(np.sqrt(np.mean(error**2))) == pytest.approx(dia.after.rmse, rel=0.05)
+
+
+@pytest.mark.parametrize(("hertz", "every", "shaft"), [(500.0, 1, True), (900.0, 1, False), (900.0, 2, True)])
+def test_a_resonance_faster_than_the_samples_show_is_no_shaft(hertz: float, every: int, shaft: bool) -> None:
+    """0.8 of half the sampling frequency, that of the controller: 800 Hz at 0.5 ms, 1600 Hz at 0.25 ms."""
+    rec = record(1, LAG, drive=SHAFT)
+    controller = ga.Cascade(ga.PI(0.06, 3.0), period=T / every)
+    data = DataSet.of([rec], controller)
+    task = Task(
+        Objective(data, np.ones(len(rec))), scales_of(data), ga.OneMass(J=4.7e-4, D=1.4e-3).model(), (), lambda message: None
+    )
+    stiffness = (2.0 * np.pi * hertz) ** 2 / (1.0 / SHAFT.J + 1.0 / SHAFT.JL)
+    two = task.start(ga.TwoMass(JM=SHAFT.J, DM=1e-3, JL=SHAFT.JL, DL=1e-3, KG=stiffness, DG=1e-3 * stiffness / 1e3).model(), 0)
+    assert resonance(two) == pytest.approx(2.0 * np.pi * hertz, rel=0.05)
+    assert task.space().swings(two) is shaft

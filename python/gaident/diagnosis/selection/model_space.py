@@ -87,8 +87,14 @@ class ModelSpace:
         return self.policy.rival_margin * (1.0 + short)
 
     def swings(self, fit: Fit) -> bool:
-        """Whether two masses may be a shaft: damped as one, and not where the records show one rigid body; one mass may be."""
-        return swings(fit) and (fit.parameters.masses == 1 or resonance(fit) >= self.rigid_below)
+        """Whether two masses may be a shaft: damped as one, not where the records show one rigid body, nor faster than they show.
+
+        One mass may be. What is faster than the samples of the controller show stands for another fast effect.
+        """
+        line = fit.parameters.scales.dt / fit.parameters.scales.blocks  # of the log, also on a coarse grid
+        every = 1 if self.data.controller is None else self.data.controller.log_every(line)
+        seen = self.policy.seen_band * np.pi * every / line
+        return swings(fit) and (fit.parameters.masses == 1 or self.rigid_below <= resonance(fit) < seen)
 
     def score(self, fit: Fit) -> float:
         """BIC and what the effects cost; the lower the better."""
