@@ -662,6 +662,37 @@ def test_evolved_finds_a_valley_nearby_that_no_slope_leads_to() -> None:
     assert bench.space.evolved(stuck) is found, "remembered"
 
 
+def test_deepened_searches_near_impacts_until_nothing_more_is_gained(monkeypatch: pytest.MonkeyPatch) -> None:
+    hit = replace(VALLEY, place="coupling")
+    bench = Bench({"valley": (0.52,)}, masses=2)
+    stuck = bench.fit(hit)
+    assert hit.impacts and not VALLEY.impacts and abs(stuck.x[-1] - 0.52) > 0.1
+    found = bench.space.deepened(stuck)
+    assert found.x[-1] == pytest.approx(0.52, abs=2e-3) and bench.space.score(found) < bench.space.score(stuck)
+    without = bench.fit(VALLEY)
+    assert bench.space.deepened(without) is without, "no impacts"
+    # Each search gains twice the margin, until there is no more of it; a search that finds worse changes nothing.
+    margin, asked = bench.space.margin, []
+    gains = iter([2.0 * margin, 2.0 * margin, 0.5 * margin])
+
+    def evolved(space: object, fit: Fit) -> Fit:
+        asked.append(fit)
+        return replace(fit, bic=fit.bic - next(gains))
+
+    monkeypatch.setattr(type(bench.space), "evolved", evolved)
+    monkeypatch.setattr(type(bench.space), "refitted", lambda space, hypothesis, x, iterations=0: replace(stuck, bic=1e9))
+    assert bench.space.deepened(stuck).bic == pytest.approx(stuck.bic - 4.5 * margin) and len(asked) == 3
+    gains = iter([-5.0 * margin])
+    assert bench.space.deepened(stuck) is stuck
+
+
+def test_demoted_takes_a_linear_model_too() -> None:
+    bench = Bench({"a": (0.4,)}, masses=2)
+    (one,) = bench.space.demoted(bench.fit())
+    assert one.parameters.masses == 1 and one.effects == ()
+    assert bench.space.demoted(one) == [] and bench.space.demoted(bench.fit(GAP)) == []
+
+
 def test_search_goes_by_all_starts_and_globally_and_never_makes_worse() -> None:
     for term, name in ((PLACED, "placed"), (VALLEY, "valley")):
         bench = Bench({name: (0.52,)}, noise=0.02)
