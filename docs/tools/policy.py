@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import re
 import textwrap
 from collections import Counter
 from collections.abc import Mapping, Sequence
@@ -16,6 +17,8 @@ from gaident.policy.table import PolicyRow, rows
 
 DOCS = Path(__file__).resolve().parents[1]
 PAGE = DOCS / "theory" / "policy.md"
+SPECIES = DOCS.parent / "csrc" / "gaident" / "search" / "species.hpp"
+HARD = "how hard an optimum is looked for: starts from each smaller structure, first iterations, starts that get more; iterations"
 MEASURED = DOCS.parent / "bench" / "rows" / "measured.json"
 
 HEAD = """\
@@ -33,9 +36,7 @@ Other numbers decide nothing and bound no search: the tolerance of a solver, the
 size of a block in memory.
 They stand where they are used, with a name or the remark `no decision`, which says why.
 The bounds and starts of each effect's parameters stand in the effect's row of `diagnosis/library/`.
-The genetic search of the core has budgets of its own: starts, iterations, and how far behind the best a structure is fitted to
-the end (`csrc/gaident/search/species.hpp`); `bench/success.py` measures what they find.
-What it hands over is decided about here.
+The genetic search of the core has [budgets of its own](#effort-of-the-cores-search).
 The core (`csrc/gaident`) decides about no model, but into how many substeps it cuts a sample (`substeps_for` in
 `nonlinear/effect_prepare.cpp`) sets how exact a simulation is: [what was measured](../effects.md#how-exact-it-is).
 
@@ -118,6 +119,18 @@ So no command measures one of them.
 """
 
 
+CORE = """\
+## Effort of the core's search
+
+Constants of `csrc/gaident/search/species.hpp`, from which this table is made: how hard the optimum of a structure is looked for,
+and which structures are fitted to the end.
+What the search hands over is decided about by the numbers above.
+`python bench/success.py` measures what they find: the structure and the parameters of its drives, all of them.
+
+| number | value | what it is |
+|---|---|---|
+"""
+
 CHANGES = """\
 ## What changes at half and at twice
 
@@ -166,7 +179,23 @@ def page() -> str:
             parts.append(EFFORTS + "".join(map(_line, found)))
         else:
             parts.append(DECIDING.format(group=group) + "".join(_line(r, f"`{r.command}`") for r in found))
-    return _head() + "\n".join([*parts, _changes()])
+    return _head() + "\n".join([*parts, CORE + "".join(_of_core()), _changes()])
+
+
+def _of_core() -> list[str]:
+    """The rows of the core's search: each number with its comment."""
+    lines, comment = [], ""
+    for line in SPECIES.read_text(encoding="utf-8").splitlines():
+        text = line.strip()
+        if text.startswith("//"):
+            comment = f"{comment} {text[2:].strip()}".strip()
+            continue
+        if text.startswith("static constexpr"):
+            declared, comment = text.removeprefix("static constexpr").split("//")[0], comment or HARD
+            for name, value in re.findall(r"(\w+)(?: = |(?=\{))([^,;{]+|\{[^}]*\})", declared):
+                lines.append(f"| `{name}` | {value.strip('{}')} | {comment} |\n")
+        comment = ""
+    return lines
 
 
 def _changes() -> str:
