@@ -15,9 +15,9 @@ __all__ = ["SHELLS", "add_log_commands", "add_log_options", "gain", "number"]
 
 SHELLS = ("bash", "zsh", "fish", "tcsh")
 COLUMNS_HELP = """\
-Lists what a log contains: the names of its columns as --columns takes them, units, range, sample time, and what
-stands in the way of their use. Formats: CSV and other text tables (of TwinCAT Scope, MR Configurator2, EPOS
-Studio, NI or ROS as well), MAT, NPZ, HDF5, Parquet, TDMS, MDF, traces of SINUMERIK (XML).
+Lists what a log contains: the names of its columns as --columns takes them, units, range, sample time, and
+what stands in the way of their use. Formats: CSV and other text tables (of TwinCAT Scope, MR Configurator2,
+EPOS Studio, NI or ROS as well), MAT, NPZ, HDF5, Parquet, TDMS, MDF, traces of SINUMERIK (XML).
 """
 INIT_HELP = """\
 Writes a drive.toml for the axis behind LOG: columns, units and sample time as the log shows them, each with

@@ -29,7 +29,6 @@ from gaident.control.controller import Controller
 from gaident.control.found import FoundNumbers
 from gaident.data.record import Record
 from gaident.data.signals.lattice import rounding_step
-from gaident.data.torque_kind import MEASURED
 from gaident.errors import GaidentError
 from gaident.identification.controller_numbers import with_estimates
 from gaident.identification.logged_stretches import Log, centred, correlation, log_of, whitened
@@ -86,12 +85,12 @@ def _off(rec: Record, controller: Controller) -> float:
     def rms(d: Vector, rho: float) -> float:
         return float(np.sqrt(np.mean(centred(*whitened(d, log.stretch, rho), False) ** 2)))
 
-    possible = float(np.sqrt(sum(rms(other, rho) ** 2 for other in others)))
-    step = rounding_step(log.torque)
-    # A commanded torque is the controller's own number, as far as the log's decimals go: what is rough in the rest is no noise.
-    noise = noise_std(left, step) if rec.torque_is == MEASURED else step / float(np.sqrt(12.0))
-    measured = min(noise, POLICY.replay_noise * float(np.std(log.torque)))
+    possible, drifting = (float(np.sqrt(sum(rms(other, r) ** 2 for other in others))) for r in (rho, 0.0))
+    noise = noise_std(left, rounding_step(log.torque))  # of a measured, or rounded, torque
     off, size = rms(left, 0.0), float(np.sqrt(np.mean(log.torque**2)))
+    # Noise is as large in the whole as from line to line, but for what adds up in the integrator: another controller is not.
+    white = off <= POLICY.undecided_ratio * float(np.hypot(noise, POLICY.interpolation * drifting))
+    measured = min(noise, POLICY.replay_noise * float(np.std(log.torque))) if white else 0.0
     follows = (
         rms(left, rho) <= max(POLICY.interpolation * possible, POLICY.undecided_ratio * measured)
         or off <= POLICY.negligible * size
