@@ -48,6 +48,7 @@ class Effort:
     population: int = effort(6, "1", "members of that search for each number that it moves")
 
     # Starts and points of a grid.
+    starts_each: int = effort(2, "1", "best starts of an effect that the score test sends into a short fit; of a resonance all")
     starts: int = effort(3, "1", "best ones of a list (starts, candidates, frequencies, rivals) that are followed up")
     promising: int = effort(2, "1", "frequencies of a resonance that are simulated, for each noise filter")
     lag_peaks: int = effort(4, "1", "peaks of the correlation of two logs, from which their offset is fitted")

@@ -345,6 +345,10 @@ class Decisions:
     )
     winding_sure: float = linear(5.0, "1", "standard deviations from 0, from which a resistance or inductance is shown", WINDING)
     least_rows: int = linear(20, "1", "rows of a regression at least, half of them each way for dry friction", REGRESSION)
+    standing_noise: float = linear(
+        3.0, "1", "standard deviations of the velocity's noise, below which an axis stands still in a regression", REGRESSION
+    )
+    standing_share: float = linear(0.005, "1", "of the velocity's rms, below which it stands still there", REGRESSION)
     both_ways: float = linear(0.02, "1", "of the rows in either direction at least, to tell dry friction from a load", REGRESSION)
     spring_turns: float = linear(10.0, "turns", "of travel: beyond, no spring is fixed to the ground", REGRESSION)
     another_mass: float = linear(

@@ -126,7 +126,9 @@ class Moves(SideMoves):
         short: dict[Term, Fit] = {}
         for ranking in rankings:
             for s in better_sides([s for s in ranking if s.term not in done])[: self.policy.screened]:
-                for x in s.starts[: len(s.starts) if s.term.resonates else 2]:  # a valley at every frequency
+                for x in s.starts[
+                    : len(s.starts) if s.term.resonates else self.policy.starts_each
+                ]:  # a valley at every frequency
                     fit = ls.scored(self.objective, ls.fit(self.objective, s.hypothesis, x, s.noise, self.policy.glance))
                     if s.term not in short or fit.bic < short[s.term].bic:
                         short[s.term] = fit

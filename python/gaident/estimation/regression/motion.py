@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 from gaident.control.filtering import zero_phase
 from gaident.data.record import Record
 from gaident.models.starts import noise_std
+from gaident.policy.table import POLICY
 
 __all__ = ["BAND", "ORDER", "Motion", "cutoff_of", "low_passed", "motion_of", "noise_share", "torque_noise"]
 
@@ -40,10 +41,6 @@ LOWEST = 0.005  # no decision: where a filter may begin
 
 HIGH = (0.35, 0.475)  # no decision: where noise is read
 """Where the noise level is read, as shares of the sample rate: the signal is assumed to be elsewhere."""
-
-DEVIATIONS = 3.0  # no decision: which samples are fitted
-OF_RMS = 0.005  # no decision: which samples are fitted
-"""Standstill: velocity below 3 deviations of its noise, or below 0.5 % of its own rms, and 1/cutoff before and after."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,7 +67,9 @@ def motion_of(rec: Record, cutoff_hz: float, order: int, standstill: float | Non
         position = np.concatenate([[0.0], np.cumsum(0.5 * rec.dt * (velocity[1:] + velocity[:-1]))])
     torque = None if rec.torque is None else low_passed(rec.torque, rec.dt, cutoff_hz, order)
     spectrum = _spectrum(rec)
-    least = max(DEVIATIONS * _velocity_noise(rec, spectrum, cutoff_hz, order), OF_RMS * float(np.sqrt(np.mean(velocity**2))))
+    # Standstill, and 1/cutoff before and after: the velocity is below its noise, or far below its own rms.
+    noise, rms = _velocity_noise(rec, spectrum, cutoff_hz, order), float(np.sqrt(np.mean(velocity**2)))
+    least = max(POLICY.standing_noise * noise, POLICY.standing_share * rms)
     threshold = least if standstill is None else standstill
     still = _beside(np.abs(velocity) <= threshold, max(1, round(1.0 / (cutoff_hz * rec.dt))))
     if standstill == 0.0:
