@@ -89,7 +89,7 @@ _ROTARY, _LINEAR = _vocabulary()
 
 
 class Text(str):
-    """A sentence in the words of a rotary axis, which holds the same of a linear axis too; `say` makes it.
+    """A sentence in the words of a rotary axis, which says the same of a linear axis too; `say` makes it.
 
     Words that only one place needs are a Text for a field of `say`: Text("several turns", "long strokes").
 

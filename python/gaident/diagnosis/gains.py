@@ -111,13 +111,13 @@ def measured_gains(
     chain += [with_effects(bare, dict(named[:k])) for k in range(1, len(named) + 1)]
     chain += [with_effects(f.parameters.model(f.x), at_controller) for f in stages[1:]]
     # Where the simulated loop is known not to be the drive's, the torque drives the models that are compared and printed.
-    driver = controller if objective.data.loop_follows or not objective.data.torque_logged else None
+    closing = controller if objective.data.loop_follows or not objective.data.torque_logged else None
     shaft = [(objective.data.as_old(r), first) for r, first in scored]
     timed = [one if logged else old for logged, one, old in zip(angles, scored, shaft, strict=True)]
-    scored = shaft if driver is None else scored
-    errors = [free_run_errors(m, scored, driver, loop) for m in chain]
+    scored = shaft if closing is None else scored
+    errors = [free_run_errors(m, scored, closing, loop) for m in chain]
     levels = [float(np.sqrt(np.mean(np.concatenate(e) ** 2))) for e in errors]
-    base = free_run_errors(stages[0].parameters.model(stages[0].x), scored, driver, loop)
+    base = free_run_errors(stages[0].parameters.model(stages[0].x), scored, closing, loop)
     level0 = float(np.sqrt(np.mean(np.concatenate(base) ** 2)))
     # The linear mechanism, refitted, may be better than the identified model already.
     previous = min(levels[0], level0) if np.isfinite(level0) else levels[0]
@@ -144,7 +144,7 @@ def measured_gains(
     harmful = []
     for effect in final.effects if words != IN_SAMPLE else ():
         less = stages[0] if len(final.effects) == 1 else _without(stages[-1], effect, _part(objective, part))
-        spared = free_run_errors(with_effects(less.parameters.model(less.x), at_controller), scored, driver, loop)
+        spared = free_run_errors(with_effects(less.parameters.model(less.x), at_controller), scored, closing, loop)
         level = float(np.sqrt(np.mean(np.concatenate(spared) ** 2)))
         if level < (1.0 - POLICY.harm) * extended_level and interval_of_fall(spared, errors[-1])[1] < 0.0:
             harmful.append(effect)
@@ -157,7 +157,7 @@ def measured_gains(
         scored=tuple(timed),
         mechanism=bare,
         extended=chain[-1],
-        closed=driver is not None,
+        closed=closing is not None,
         harmful=tuple(harmful),
     )
 
