@@ -334,7 +334,8 @@ class _Work:
         s = self.settings
         lowest = min((c.bic for c in scored), default=0.0)
         # Where every structure is contradicted a criterion that supposes one of them true ranks nothing.
-        close = [] if verdict.falsified else scored
+        closer = lowest < bic - POLICY.rival_margin  # the reported one is the smallest mechanism
+        close = [] if verdict.falsified or closer else scored
         close = [c for c in close if c.bic <= bic + POLICY.rival_margin and (c.p, c.q) != (model.p, model.q)]
         rivals = sorted((Rival(c.p, c.q, c.bic - bic, c.model) for c in close), key=lambda r: r.delta_bic)
         states = {d: tuple(x.tolist()) for d, x in zip(self.digests, self.states(best.candidate), strict=True) if len(x)}
@@ -356,7 +357,7 @@ class _Work:
                 mechanics,
                 rivals,
                 model,
-                lowest < bic - POLICY.rival_margin,
+                closer,
                 record_notes(self.records, self.controller, s.initial_state),
             ),
             space=self.space,

@@ -32,10 +32,10 @@ def warnings_of(
     notes = list(started)
     if adequacy.falsified or adequacy.undecided:
         notes.append(adequacy.sentence)
-    if adequacy.falsified and larger_fits_better:
+    if larger_fits_better:
         notes.append(
             "Larger structures come closer, but only by absorbing what no linear structure holds; the smallest mechanism "
-            f"is reported, ({model.p},{model.q})."
+            f"is reported, ({model.p},{model.q}). A diagnosis looks for what is missing: a lag, a delay, friction."
         )
     bound = [n for n, e in parameters.items() if e.at_bound]
     if bound:

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import gaident as ga
+from drive_rig import Noise, Plant, rig, skip_without_library
 from gaident.errors import RecordError, SettingsError, SpaceError
 
 DT = 0.444e-3
@@ -352,3 +353,15 @@ def test_rounds_go_on_only_for_better_optima() -> None:
     assert idn.rmse > 1.0
     assert idn.trials[0].generations == 2 * ga.Settings().round
     assert ga.identify(rec, loop, workers=1).trials[0].generations == ga.Settings().round
+
+
+def test_a_structure_far_behind_the_best_has_no_rivals_within_reach() -> None:
+    """One mass behind a current loop: the smallest mechanism is reported, and the note says why, and what to do next."""
+    skip_without_library()
+    dt, levels = 0.25e-3, np.repeat(np.random.default_rng(3).uniform(-70.0, 70.0, 14), 250)
+    plant, lag = Plant(J=1.5e-3, D=0.004, kp=0.45, ki=20.0, dt=dt), {"torque_lag": {"time_constant": 0.4e-3}}
+    encoder = Noise(white=0.0, encoder=2.0 * np.pi / 2**20, differenced=True)
+    idn = ga.identify(rig(plant, levels, lag, encoder, seed=3), ga.PI(0.45, 20.0))
+    assert idn.p == 1 and idn.rivals == ()
+    assert any("Larger structures come closer" in note and "A diagnosis looks for" in note for note in idn.warnings)
+    assert not any("the smallest is reported" in note for note in idn.warnings)
