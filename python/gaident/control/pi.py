@@ -331,5 +331,6 @@ def checked_pi(controller: object, what: str) -> PI | None:
     given = checked_controller(controller)
     pi = bare_pi(given)
     if given is not None and pi is None:
-        raise SettingsError(f"controller is {given!r}: {what} of a bare PI only; give PI(kp, ki), or None for the drive alone")
+        kind = f"a {type(given).__name__} with more than kp and ki"
+        raise SettingsError(f"controller is {kind}: {what} of a bare PI only; give PI(kp, ki), or None for the drive alone")
     return pi
