@@ -212,6 +212,7 @@ def test_what_is_drawn_has_the_age_and_the_error_of_the_table(controller: ga.PI 
     assert dia.velocity_age == 0.5 == ga.Diagnosis.from_dict(dia.to_dict()).velocity_age
     view = run_of(dia, rec)
     assert view.extended is not None and view.held_out_from is not None
+    # The curve has the parameters of the whole record, the table those of its first 70 %.
     error = (view.measured - view.extended)[view.held_out_from :]
     assert float(np.sqrt(np.mean(error**2))) == pytest.approx(dia.after.rmse, rel=0.05)
 

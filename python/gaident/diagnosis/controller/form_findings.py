@@ -224,7 +224,7 @@ def notes_of(shown: Shown, records: Sequence[Record]) -> tuple[Text, ...]:
             shown.before,
             parts_of(shown),
             shown.rms,
-            say(": its {torque} drives the model, and no loop is simulated") if shown.controller.period is None else "",
+            say(": its {torque} drives the model") if shown.controller.period is None else "",
         )
     ]
     scheme = shown.controller.velocity.anti_windup
