@@ -17,7 +17,8 @@ from gaident.policy.table import PolicyRow, rows
 
 DOCS = Path(__file__).resolve().parents[1]
 PAGE = DOCS / "theory" / "policy.md"
-SPECIES = DOCS.parent / "csrc" / "gaident" / "search" / "species.hpp"
+CORE_SOURCE = DOCS.parent / "csrc" / "gaident"
+CORE_BUDGETS = ("search/species.hpp", "identification/neighbours.hpp", "identification/velocity_objective.hpp")
 HARD = "how hard an optimum is looked for: starts from each smaller structure, first iterations, starts that get more; iterations"
 MEASURED = DOCS.parent / "bench" / "rows" / "measured.json"
 
@@ -122,8 +123,8 @@ So no command measures one of them.
 CORE = """\
 ## Effort of the core's search
 
-Constants of `csrc/gaident/search/species.hpp`, from which this table is made: how hard the optimum of a structure is looked for,
-and which structures are fitted to the end.
+Constants of `search/species.hpp`, `identification/neighbours.hpp` and `identification/velocity_objective.hpp` in `csrc/gaident`,
+from which this table is made: how hard the optimum of a structure is looked for, and which structures are fitted to the end.
 What the search hands over is decided about by the numbers above.
 `python bench/success.py` measures what they find: the structure and the parameters of its drives, all of them.
 
@@ -185,13 +186,14 @@ def page() -> str:
 def _of_core() -> list[str]:
     """The rows of the core's search: each number with its comment."""
     lines, comment = [], ""
-    for line in SPECIES.read_text(encoding="utf-8").splitlines():
+    source = "".join((CORE_SOURCE / name).read_text(encoding="utf-8") for name in CORE_BUDGETS)
+    for line in source.splitlines():
         text = line.strip()
         if text.startswith("//"):
             comment = f"{comment} {text[2:].strip()}".strip()
             continue
-        if text.startswith("static constexpr"):
-            declared, comment = text.removeprefix("static constexpr").split("//")[0], comment or HARD
+        if text.startswith(("static constexpr", "inline constexpr")):
+            declared, comment = text.split("constexpr")[1].split("//")[0], comment or HARD
             for name, value in re.findall(r"(\w+)(?: = |(?=\{))([^,;{]+|\{[^}]*\})", declared):
                 lines.append(f"| `{name}` | {value.strip('{}')} | {comment} |\n")
         comment = ""

@@ -15,8 +15,7 @@ struct RefineOptions {
     SearchRanges ranges;
     bool bounded = true;            // keep roots and gain inside the ranges
     std::vector<double> whitening;  // phi; empty: the plain error
-    int max_iterations = 30;
-    double tolerance = 1e-9;  // relative fall of J, twice in a row, at which it stops
+    double tolerance = 1e-9;        // relative fall of J, twice in a row, at which it stops
 };
 
 struct Refined {
@@ -35,7 +34,6 @@ public:
 
     // `starts` may be empty: then steady motion at each record's velocity0.
     Refined fit(const Factors<double>& g, const std::vector<double>& starts, int max_iterations) const;
-    Refined fit(const Factors<double>& g) const { return fit(g, {}, options_.max_iterations); }
     // Up to so many iterations more.
     Refined go_on(const Refined& from, int max_iterations) const;
 

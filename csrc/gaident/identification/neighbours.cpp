@@ -33,12 +33,11 @@ std::vector<Factors<double>> grow(const Factors<double>& from, Structure to, con
                                   double fastest) {
     const int dp = to.p - from.structure.p, dq = to.q - from.structure.q;
     std::vector<Factors<double>> made;
-    constexpr int points = grid_points;
     const auto grid = [&](double lo, double hi, auto&& use) {
         lo = std::max(lo, slowest);
         hi = std::min(hi, fastest);
         if (!(hi > lo)) return;
-        for (int k = 0; k < points; ++k) use(lo * std::pow(hi / lo, (k + 0.5) / points));
+        for (int k = 0; k < grid_points; ++k) use(lo * std::pow(hi / lo, (k + 0.5) / grid_points));
     };
     const auto resonance = [&](double w, double ratio, double damping, double gain) {
         Roots r(from);

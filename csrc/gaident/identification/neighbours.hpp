@@ -8,6 +8,7 @@
 
 namespace gaident {
 
+// Places of a module that is added, evenly spaced in the logarithm of its frequency.
 inline constexpr int grid_points = 12;
 
 // Whether `to` is `from` and one module, or one conjugate pair of modules: a pole; a pole and a zero.

@@ -16,8 +16,7 @@ namespace {
 // times the noise's.
 // Of a long record an evenly spaced part will do.
 double noise_power(std::span<const double> w) {
-    constexpr std::size_t enough = 4096;
-    const std::size_t stride = std::max<std::size_t>(1, w.size() / enough);
+    const std::size_t stride = std::max<std::size_t>(1, w.size() / noise_samples);
     std::vector<double> sizes;
     for (std::size_t n = 3; n < w.size(); n += stride)
         sizes.push_back(std::abs(w[n] - 3.0 * w[n - 1] + 3.0 * w[n - 2] - w[n - 3]));

@@ -11,6 +11,9 @@
 
 namespace gaident {
 
+// Samples, evenly spaced, from which the noise of a record is estimated.
+inline constexpr std::size_t noise_samples = 4096;
+
 // Structures allowed by the ranges, by p + q, then by q.
 std::vector<Structure> structures(const SearchRanges& ranges);
 // Those, and all smaller ones that lead to them.

@@ -31,6 +31,7 @@ class Effort:
     rounds: int = effort(3, "1", "times that a search is made again under what the one before has shown: gains, a correlation")
     commands: int = effort(4, "1", "of the menu of experiments, on which rivals are fitted, not only linearised")
     smaller_commands: int = effort(4, "1", "times that a proposed command is made smaller, until it keeps the torque limit")
+    quickened: int = effort(60, "1", "times that a proposed command is made shorter, until it fits the time asked for")
     paired_columns: int = effort(30, "1", "columns of a log at most, whose pairs are tried as position and velocity")
 
     # Iterations of a fit.
@@ -70,6 +71,9 @@ class Effort:
     draws: int = effort(200, "1", "of the bootstrap of an interval")
 
     # Samples that are looked at.
+    spectrum_samples: int = effort(64, "samples", "of a record at least, in whose error's spectrum peaks are looked for")
+    spectrum_mean: int = effort(31, "lines", "of that spectrum, whose running mean is the level that a peak stands above")
+    peak_half_width: int = effort(4, "lines", "on either side of a peak of that spectrum, in which no other is looked for")
     searched_samples: int = effort(
         1 << 13, "samples", "of all records in which a model, or a controller's numbers, are searched; a window has half of them"
     )

@@ -340,7 +340,7 @@ TEST_CASE("refine: every kernel set takes the same path") {
         const Kernels* k = kernels_named(name);
         if (k == nullptr) continue;
         bench.experiment.kernels = k;
-        fits.push_back(Refiner(bench.experiment, wide()).fit(start));
+        fits.push_back(Refiner(bench.experiment, wide()).fit(start, {}, 30));
         CHECK(fits.back().cost == fits.front().cost);
         CHECK(fits.back().iterations == fits.front().iterations);
         CHECK(pack(fits.back().factors, {}) == pack(fits.front().factors, {}));

@@ -31,6 +31,7 @@ from gaident.diagnosis.library.settings import OF_SETTING
 from gaident.diagnosis.library.terms import LIBRARY
 from gaident.errors import SettingsError
 from gaident.models.drive_torque import torque_of
+from gaident.policy.table import POLICY
 from gaident.results.experiment import Limits, Proposal, swept
 
 __all__ = ["Limits", "MenuItem", "Proposal", "candidate_commands", "first_experiment", "limits_of"]
@@ -217,7 +218,7 @@ def _filled(build: Builder, bench: Bench) -> Vector:
     """The pattern, quickened (then slowed down) until it fits the bench's time, as often as it then fits."""
     room = int(bench.seconds / bench.dt + 1e-9)
     pattern = build(bench)
-    for attempt in range(60):
+    for attempt in range(POLICY.quickened):
         if len(pattern) <= room:
             break
         # Ramps of a heavy axis take their time whatever the dwell: lower speeds are reached sooner.

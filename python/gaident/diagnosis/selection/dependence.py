@@ -26,7 +26,6 @@ from gaident.policy.table import POLICY
 __all__ = ["Dependence", "beside_torque_noise", "dependence", "families", "without_torque"]
 
 ROOM, LEAST = 16, 4  # no decision: samples for each function of a driver's family, and the functions that any record has room for
-LINES = (64, 31, 4)  # no decision: samples of a spectrum that peaks are looked for in, lines of its running mean, half a peak's
 
 Vector = NDArray[np.float64]
 Matrix = NDArray[np.float64]
@@ -223,8 +222,8 @@ def _lines(error: Vector, lengths: tuple[int, ...]) -> list[Matrix]:
     The frequency is that of all records, phase and size are each record's own: a hum knows nothing of when a log begins.
     """
     longest = max(lengths)
-    least, width, half = LINES
-    if longest < least:
+    width, half = POLICY.spectrum_mean, POLICY.peak_half_width
+    if longest < POLICY.spectrum_samples:
         return []
     parts = np.split(error, np.cumsum(lengths)[:-1])
     windowed = np.array([np.fft.rfft((e - e.mean()) * np.hanning(len(e)), longest) for e in parts])
