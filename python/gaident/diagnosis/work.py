@@ -90,14 +90,14 @@ class Work:
         self.notes: list[Text] = list(self.driving.logged.notes)
         if self.controller is None or self.pi is not None:
             self.notes += open_loop_notes(self.records, self.pi)
-        of_log = (self.driving.outliers_in(r) for r in self.records)
-        hit = [np.union1d(left_out(r, self.idn.model, self.pi), h) for r, h in zip(self.records, of_log, strict=True)]
-        clean = [cleaned(r, h) for r, h in zip(self.records, hit, strict=True)]
-        self.hit, self.clean = hit, tuple(clean)
+        of_log = [self.driving.outliers_in(r) for r in self.records]  # the records have what the controller read there
+        others = [np.setdiff1d(left_out(r, self.idn.model, self.pi), h) for r, h in zip(self.records, of_log, strict=True)]
+        self.hit = hit = [np.union1d(h, more) for h, more in zip(of_log, others, strict=True)]
+        self.clean = clean = tuple(cleaned(r, h) for r, h in zip(self.records, others, strict=True))
         self.step = quantisation(self.records)
         whole = self.driving.read
-        read = as_read(whole, [cleaned(r, h) for r, h in zip(whole, hit, strict=True)], self.controller)
-        data = DataSet.of(clean, self.controller, any(len(h) for h in hit), read, self.step, self.axis, self.pitch)
+        read = as_read(whole, [cleaned(r, h) for r, h in zip(whole, others, strict=True)], self.controller)
+        data = DataSet.of(clean, self.controller, any(len(h) for h in others), read, self.step, self.axis, self.pitch)
         data = data.with_its_period()
         self.notes += period_seen(data)
         self.scales = scales_of(data)

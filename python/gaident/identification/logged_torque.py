@@ -38,7 +38,7 @@ from gaident.models.starts import noise_std, starts_moving
 from gaident.policy.table import POLICY
 from gaident.results.estimate import Estimate
 
-__all__ = ["Corrected", "comparable", "corrected", "noise_between", "not_followed"]
+__all__ = ["Corrected", "comparable", "corrected", "noise_between", "not_followed", "tells_of_controller"]
 
 Vector = NDArray[np.float64]
 
@@ -64,12 +64,14 @@ def not_followed(records: Sequence[Record], controller: Controller | None) -> tu
 
 def comparable(rec: Record, controller: Controller) -> bool:
     """Whether a record that is slower than this controller starts at rest and contains torque and all that it reads."""
+    return controller.log_every(rec.dt) > 1 and tells_of_controller(rec, controller)
+
+
+def tells_of_controller(rec: Record, controller: Controller) -> bool:
+    """Whether a record starts at rest and contains the torque and all that this controller reads."""
     needed = (rec.torque, *(getattr(rec, channel) for channel in controller.reads))
     return (
-        controller.log_every(rec.dt) > 1
-        and all(signal is not None for signal in needed)
-        and len(rec) >= POLICY.least_samples
-        and not starts_moving(rec, controller)
+        all(signal is not None for signal in needed) and len(rec) >= POLICY.least_samples and not starts_moving(rec, controller)
     )
 
 

@@ -16,7 +16,7 @@ from gaident.data.record import Record
 from gaident.diagnosis.controller.slow_forms import run_error
 from gaident.diagnosis.records.hygiene import cleaned, outliers
 from gaident.identification.logged_stretches import log_of
-from gaident.identification.logged_torque import comparable
+from gaident.identification.logged_torque import tells_of_controller
 from gaident.models.starts import noise_std
 
 __all__ = ["as_read", "outliers_of_the_log"]
@@ -45,10 +45,12 @@ def _replay_error(rec: Record, controller: Controller) -> float:
 
 
 def outliers_of_the_log(records: Sequence[Record], controller: Controller | None) -> tuple[tuple[Record, ...], tuple[Lines, ...]]:
-    """(the records with what their controller read in the place of outliers, the lines of these), of slow logs.
+    """(the records with what their controller read in the place of outliers, the lines of these).
 
-    Where a log is slower than its controller, a velocity that is smooth between the lines spreads an outlier over its neighbours,
-    in the torque that drives a model, too.
+    An outlier stands in the log alone where the velocity that the torque answers is nearer to its neighbours than to the outlier.
+    With it the logged torque does not follow from the controller, and a form of controller would be looked for in vain.
+    Where a log is slower than its controller, a velocity that is smooth between the lines spreads it over its neighbours, in the
+    torque that drives a model, too.
     """
     found = [_of_the_log(r, controller) for r in records]
     return tuple(r for r, _ in found), tuple(lines for _, lines in found)
@@ -56,9 +58,14 @@ def outliers_of_the_log(records: Sequence[Record], controller: Controller | None
 
 def _of_the_log(rec: Record, controller: Controller | None) -> tuple[Record, Lines]:
     none = np.zeros(0, dtype=np.intp)
-    if controller is None or controller.unknown or controller.loop != "sampled" or not comparable(rec, controller):
+    if controller is None or controller.unknown or controller.loop != "sampled" or not tells_of_controller(rec, controller):
         return rec, none
     lines, cascade = outliers(rec.velocity), cascade_of(controller)
+    if not len(lines):
+        return rec, none
+    interpolated = cleaned(rec, lines)
+    answered = _answered(interpolated, lines, cascade).velocity[lines]
+    lines = lines[np.abs(answered - interpolated.velocity[lines]) < np.abs(answered - rec.velocity[lines])]
     if not len(lines):
         return rec, none
     without = _answered(cleaned(rec, lines), lines, cascade)

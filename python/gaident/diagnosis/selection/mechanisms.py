@@ -6,6 +6,7 @@ diagnosis starts from the mechanism, so that they can be told by name.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -105,14 +106,28 @@ def released(fit: Fit) -> tuple[Hypothesis, Vector]:
 
 
 def rigid(identified: Model) -> list[Model]:
-    """The identified model's slowest real pole alone, with its gain at standstill; none without one, or where it is negative."""
-    real = [r for r in identified.poles if r.imag == 0.0]
-    if not real:
-        return []
-    slow = min(real, key=abs)
-    others = [r for r in identified.poles if r != slow]
-    gain = float(identified.gain * np.prod(np.abs(identified.zeros)) / np.prod(np.abs(others)))
-    return [Model(gain, [slow])] if gain > 0.0 else []
+    """One-mass starts: the slowest real pole of the identified model, with its gain at standstill, where that is not negative.
+
+    A slower pole whose zero is slower than the next real pole, too, may be a pair that nearly cancels: that next pole is another
+    start, without the pair.
+    """
+    poles, zeros = (sorted((r for r in roots if r.imag == 0.0), key=abs) for roots in (identified.poles, identified.zeros))
+    found = []
+    for k, slow in enumerate(poles):
+        if k > len(zeros) or (k > 0 and abs(zeros[k - 1]) > abs(slow)):
+            break
+        gain = identified.gain * np.prod(np.abs(_without(identified.zeros, zeros[:k])))
+        gain /= np.prod(np.abs(_without(identified.poles, poles[: k + 1])))
+        if gain > 0.0:
+            found.append(Model(float(gain), [slow]))
+    return found
+
+
+def _without(roots: Sequence[complex], left_out: Sequence[complex]) -> list[complex]:
+    kept = list(roots)
+    for r in left_out:
+        kept.remove(r)
+    return kept
 
 
 def reduced(identified: Model) -> list[Model]:
