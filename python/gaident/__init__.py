@@ -36,7 +36,6 @@ provide(
         "plot_poles_zeros": "gaident.show.plots:plot_poles_zeros",
         "plot_convergence": "gaident.show.plots:plot_convergence",
         "plot_structures": "gaident.show.plots:plot_structures",
-        "replay_notes": "gaident.diagnosis.explain.replayed:replay_notes",
         # Diagnosis
         "diagnosis_summary": "gaident.show.diagnosis_summary:diagnosis_summary",
         "diagnosis_html": "gaident.show.report.notebook:diagnosis_html",

@@ -1,4 +1,4 @@
-"""Methods of records, models and results whose work stands in a higher room.
+"""Methods of records, models and results whose work stands in a higher room, and the winding that a reader estimates.
 
 `model.to_c(...)`, `idn.plot()` and `dia.summary()` belong to the object that a user has, but what they do is the work of rooms
 that stand above it: export, text, pictures, the report.

@@ -261,7 +261,7 @@ private:
         }
     }
 
-    // A substep of the mechanism under the torque that is held, and its parts: effect_substep.hpp.
+    // A substep of the mechanism under the torque that is held, and its parts: effect_substep.hpp, which a user of the loop includes.
     void substep(int j, double t);
     template <Side side, class States>
     R under_friction(States& states, const FrictionLaw<R>& law, const FreeEnd<R>& end, double t);
@@ -286,5 +286,3 @@ private:
 };
 
 }  // namespace gaident
-
-#include "effect_substep.hpp"

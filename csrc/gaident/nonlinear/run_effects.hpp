@@ -1,7 +1,7 @@
 // The loop with effects for the mechanism that a run has.
 #pragma once
 
-#include "effect_loop.hpp"
+#include "effect_substep.hpp"
 
 namespace gaident {
 

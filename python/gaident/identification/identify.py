@@ -26,6 +26,7 @@ from gaident.identification.controller_numbers import with_estimates
 from gaident.identification.noise import Autoregression, autoregression_of, highest_order
 from gaident.identification.notes import record_notes, unseen_notes, warnings_of
 from gaident.identification.parts import search_parts
+from gaident.identification.replay.notes import replay_notes
 from gaident.identification.selection import Candidate
 from gaident.messages import Message
 from gaident.models.mechanics import mechanics_from_model
@@ -33,7 +34,6 @@ from gaident.models.model import Model
 from gaident.models.search_space import SearchSpace
 from gaident.models.starts import noise_std, starts_moving
 from gaident.policy.table import POLICY
-from gaident.providers import provided
 from gaident.results.adequacy import Adequacy
 from gaident.results.identification import Identification
 from gaident.results.settings import Settings
@@ -141,7 +141,7 @@ def identify(
     found = work.search(int(trials), int(seed), progress)
     best, scored = work.select(found)
     result = work.report(best, scored, found, int(seed))
-    warnings = [*provided("replay_notes")(checked, controller), *numbers.notes, *looped.notes, *result.warnings]
+    warnings = [*replay_notes(checked, controller), *numbers.notes, *looped.notes, *result.warnings]
     warnings += unseen_notes(result.mechanics, given[0].dt)
     if derived and not settings.species:
         warnings.append(

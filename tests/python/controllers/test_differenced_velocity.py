@@ -15,8 +15,8 @@ from test_servo import CASES, KI, KP, T
 import gaident as ga
 from drive_rig import Array, Noise, Plant, rig, skip_without_library
 from gaident.control.differencing import differencing
-from gaident.diagnosis.controller.replay import replay
 from gaident.diagnosis.gains import closed_over
+from gaident.identification.replay.replay import replay
 
 skip_without_library()
 

@@ -16,7 +16,7 @@ import gaident as ga
 from drive_rig import Plant, run_drive, skip_without_library
 from gaident.cli.main import main
 from gaident.data.signals.difference import backward_difference, is_backward_difference
-from gaident.diagnosis.controller.replay import replay
+from gaident.identification.replay.replay import replay
 
 DT = 0.5e-3
 J, D, FRICTION = 3e-4, 2e-3, 0.05

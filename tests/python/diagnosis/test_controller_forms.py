@@ -16,11 +16,11 @@ from gaident.diagnosis.controller.form_findings import driver_of, loop_of
 from gaident.diagnosis.controller.form_regression import fitted_shape, law_of
 from gaident.diagnosis.controller.forms import Shown, form_shown
 from gaident.diagnosis.controller.other_form import other_form
-from gaident.diagnosis.controller.replay import replay
 from gaident.diagnosis.controller.slow_forms import limited
 from gaident.diagnosis.explain.alternatives import alternatives_of
 from gaident.diagnosis.explain.verdict import verdict_of
 from gaident.identification.logged_torque import not_followed
+from gaident.identification.replay.replay import replay
 from gaident.models.drive_torque import torque_driven
 from referee_logs import GIVEN, KI, KP, NOTCH, T, command, dip, log, low, slower
 

@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 
 import gaident as ga
-import gaident.diagnosis.controller.replay as replay_module
+import gaident.identification.replay.replay as replay_module
 from friction_drive import CONTROLLER, DRIVE, DT, drive_record
 from gaident.control.pi_torque import held_torque
-from gaident.diagnosis.controller.replay import Replay, replay
 from gaident.diagnosis.records.hygiene import outliers
+from gaident.identification.replay.replay import Replay, replay
 
 J, D = 5e-4, 2e-3
 LEVELS = np.repeat((60.0, -60.0, 20.0, -40.0, 60.0, -20.0), 120)

@@ -12,7 +12,6 @@ from scipy import signal
 
 import gaident as ga
 from gaident.data.signals.lattice import digits_step, lattice_step, rounding_step
-from gaident.diagnosis.controller.replay import replay
 from gaident.diagnosis.experiments.excitation import excitation
 from gaident.diagnosis.explain.alternatives import alternatives_of, impossible_here
 from gaident.diagnosis.explain.missing_torque import missing_torque
@@ -22,6 +21,7 @@ from gaident.diagnosis.library.equivalences import EQUIVALENT
 from gaident.diagnosis.selection.offset import Offset
 from gaident.errors import ModelError, RecordError
 from gaident.estimation.state_space import discretised, disturbed
+from gaident.identification.replay.replay import replay
 from written_out import CONTROLLER, DT, LEVELS, ONE_MASS, TWO_MASS, changed, drive
 
 # --- controller replay
@@ -60,10 +60,10 @@ def test_rounded_and_measured_torques_follow() -> None:
 @pytest.mark.parametrize(
     ("rec", "cause", "value"),
     [
-        (drive(clamp=0.1), "integrator_clamp", 0.1),
+        (drive(clamp=0.1), "integrator_limit", 0.1),
         (drive(limit=0.6), "torque_limit", 0.6),
-        (drive(clamp=0.1, limit=0.6), "integrator_clamp", 0.1),
-        (drive(rate=3000.0), "command_rate_limit", 3000.0),
+        (drive(clamp=0.1, limit=0.6), "integrator_limit", 0.1),
+        (drive(rate=3000.0), "command_rate", 3000.0),
         (drive(rectangular=True), "integration_rule", math.nan),
         (changed(drive(), torque=1000.0 * drive().torque), "scale", 1000.0),
         (changed(drive(), torque=-drive().torque), "scale", -1.0),

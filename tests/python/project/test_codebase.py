@@ -286,6 +286,18 @@ def test_names_that_are_provided_are_there() -> None:
         providers.provided("no such name")
 
 
+def test_only_methods_ask_a_higher_room() -> None:
+    """Methods of what a user has, and the reader of a log, whose winding is estimated: what else is above is not asked for."""
+    free = set()
+    for file in sources(PACKAGE, ".py"):
+        tree = ast.parse(file.read_text())
+        inside = {n for c in ast.walk(tree) if isinstance(c, ast.ClassDef) for n in ast.walk(c)}
+        calls = (n for n in ast.walk(tree) if isinstance(n, ast.Call) and isinstance(n.func, ast.Name))
+        if file.stem != "providers" and any(n.func.id in ("provided", "picture") and n not in inside for n in calls):
+            free.add(file.stem)
+    assert free == {"winding_torque"}
+
+
 def test_what_shows_results_is_typed() -> None:
     """Text, pictures and the page take results, models and records, whose types stand below them."""
     assert not [str(f.relative_to(ROOT)) for f in sources(PACKAGE / "show", ".py") if re.search(r"\bAny\b", f.read_text())]

@@ -35,7 +35,6 @@ from gaident.axis import (
     word,
 )
 from gaident.data.listing import columns
-from gaident.diagnosis.controller.replay import replay
 from gaident.diagnosis.experiments.excitation import excitation
 from gaident.diagnosis.experiments.first_experiment import candidate_commands, first_experiment
 from gaident.diagnosis.explain.wording import evidence_of, or_other_form
@@ -46,6 +45,7 @@ from gaident.diagnosis.selection.unlogged_form import VARIANTS
 from gaident.drive.draft import draft
 from gaident.errors import GaidentError, RecordError, SettingsError
 from gaident.identification.notes import open_loop_notes
+from gaident.identification.replay.replay import replay
 from gaident.reporting import report_page
 from gaident.results.finding import Finding
 from gaident.show.report import parts

@@ -17,13 +17,13 @@ from gaident.control.controller import Controller
 from gaident.control.pi import PI
 from gaident.control.pi_torque import HOLDS, held_torque, pi_torque
 from gaident.data.record import Record
-from gaident.diagnosis.controller.replay import Replay, replay
-from gaident.diagnosis.controller.replay_causes import white_noise
 from gaident.diagnosis.library.settings import OF_SETTING
 from gaident.diagnosis.library.terms import in_controller
 from gaident.estimation.criterion import gained
 from gaident.estimation.dataset import DataSet, torque_in
 from gaident.estimation.term import Scales, Term
+from gaident.identification.replay.causes import white_noise
+from gaident.identification.replay.replay import Replay, replay
 from gaident.models.effects import table
 from gaident.policy.table import POLICY
 from gaident.results.estimate import Estimate
@@ -33,7 +33,7 @@ __all__ = ["AsLogged", "AtController", "as_logged", "controller_findings"]
 
 Vector = NDArray[np.float64]
 
-LIMITS = ("torque_limit", OF_SETTING["integrator_limit"], "anti_windup")  # causes that a replay finds
+LIMITS = ("torque_limit", "integrator_limit", "anti_windup")  # causes that a replay finds
 SHOWN = {
     "torque_limit": say("plateau of the logged {torque}"),
     "integrator_limit": Text("highest integral that the log shows"),

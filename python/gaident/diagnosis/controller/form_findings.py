@@ -17,10 +17,10 @@ from gaident.data.record import Record
 from gaident.diagnosis.controller.forms import Shown, form_shown
 from gaident.diagnosis.controller.limit_not_given import left_by_a_limit
 from gaident.diagnosis.controller.period_shown import FASTER, Period, period_shown
-from gaident.diagnosis.controller.replay import replay
 from gaident.diagnosis.controller.slow_forms import run_error
 from gaident.diagnosis.library.settings import OF_SETTING
 from gaident.identification.controller_numbers import Numbers, with_estimates
+from gaident.identification.replay.replay import replay
 from gaident.models.drive_torque import driven_by
 from gaident.policy.table import POLICY
 from gaident.results.estimate import Estimate

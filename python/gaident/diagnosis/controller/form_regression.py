@@ -23,10 +23,10 @@ from gaident.control.filters import LowPass, Notch
 from gaident.control.pi import PI
 from gaident.control.ticks import at_the_clock, between_lines
 from gaident.data.record import Record
-from gaident.diagnosis.controller.replay import rounding_of
 from gaident.identification.logged_stretches import centred, correlation_of, log_of, numbered, whitened
 from gaident.identification.logged_torque import noise_between
 from gaident.identification.number_ranges import FREQUENCIES, TIME_CONSTANTS
+from gaident.identification.replay.replay import rounding_of
 from gaident.policy.table import POLICY
 
 __all__ = [

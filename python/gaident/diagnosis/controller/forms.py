@@ -49,12 +49,12 @@ from gaident.diagnosis.controller.form_regression import (
     quiet_law,
     slope,
 )
-from gaident.diagnosis.controller.replay import tolerance_of, velocity_steps
-from gaident.diagnosis.controller.replay_causes import white_noise
 from gaident.diagnosis.controller.slow_forms import limited, run_error, too_fast
 from gaident.diagnosis.library.settings import OF_SETTING
 from gaident.estimation.criterion import bic, cost_of
 from gaident.estimation.projection import inverse_of
+from gaident.identification.replay.causes import white_noise
+from gaident.identification.replay.replay import tolerance_of, velocity_steps
 from gaident.models.drive_torque import made_by
 from gaident.policy.table import POLICY
 

@@ -28,10 +28,10 @@ from gaident.axis import Text, called, joined, say
 from gaident.control.pi import PI
 from gaident.data.record import Record
 from gaident.data.torque_kind import MEASURED
-from gaident.diagnosis.controller.replay import replay
 from gaident.estimation.criterion import gained
 from gaident.estimation.regression.torque_lag import TorqueLag, torque_lag
 from gaident.identification.notes import reading_notes
+from gaident.identification.replay.replay import replay
 from gaident.policy.table import POLICY
 from gaident.results.diagnosis import Diagnosis
 

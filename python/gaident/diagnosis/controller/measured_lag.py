@@ -28,9 +28,9 @@ from gaident.control.pi import PI
 from gaident.control.pi_torque import pi_torque
 from gaident.data.record import Record
 from gaident.data.torque_kind import COMMANDED, MEASURED
-from gaident.diagnosis.controller.replay import replay
-from gaident.diagnosis.controller.replay_causes import white_noise
 from gaident.estimation.criterion import bic
+from gaident.identification.replay.causes import white_noise
+from gaident.identification.replay.replay import replay
 from gaident.policy.table import POLICY
 
 __all__ = ["Lag", "commanded", "lag_shown"]

@@ -30,11 +30,11 @@ from gaident.control.cascade import Cascade, cascade_of
 from gaident.control.controller import Controller
 from gaident.data.record import Record
 from gaident.data.signals.lattice import encoder_step
-from gaident.diagnosis.controller.replay import replay
 from gaident.diagnosis.controller.slow_forms import limited, run_error
 from gaident.estimation.regression.torque_lag import torque_lag
 from gaident.identification.logged_stretches import log_of
 from gaident.identification.logged_torque import comparable, not_followed
+from gaident.identification.replay.replay import replay
 from gaident.models.drive_torque import HALF, driven_by
 from gaident.policy.table import POLICY
 

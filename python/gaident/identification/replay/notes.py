@@ -8,7 +8,7 @@ from gaident.axis import Text, joined, say, unit_text
 from gaident.control.controller import Controller
 from gaident.control.pi import bare_pi
 from gaident.data.record import Record
-from gaident.diagnosis.controller.replay import Replay, replay
+from gaident.identification.replay.replay import Replay, replay
 from gaident.policy.table import POLICY
 
 __all__ = ["replay_notes"]

@@ -1,7 +1,7 @@
 """Controller replay: run again on the measured velocity; does the logged torque follow from it?
 
 No plant is needed: what the controller does is decided before any mechanism is considered. Where the
-logged torque does not follow from a bare PI, `replay_causes` looks for the simple reasons.
+logged torque does not follow from a bare PI, `causes` looks for the simple reasons.
 
 A diagnosis asks for the replay of a record in several places: each is kept for as long as its record is.
 """
@@ -22,8 +22,8 @@ from gaident.control.controller import Controller, VelocityGains
 from gaident.control.pi import PI, bare_pi
 from gaident.data.record import Record
 from gaident.data.signals.lattice import digits_step, lattice_step, place_step, rounding_step
-from gaident.diagnosis.controller.replay_causes import explain, rounded_command, white_noise
 from gaident.errors import RecordError
+from gaident.identification.replay.causes import explain, rounded_command, white_noise
 from gaident.policy.table import POLICY
 
 __all__ = ["Replay", "replay", "rounding_of", "tolerance_of", "velocity_steps"]
@@ -45,8 +45,8 @@ class Replay:
                 with a free start of the integrator; None: nothing to compare
     cause       what makes it follow: "" (nothing found, or nothing needed), "initial_integral" (the record starts under load),
                 or, where it does not follow as configured, "scale", "gains", "integration_rule", "shift", "torque_limit",
-                "integrator_clamp", "anti_windup" (a torque limit at which the integrator does not wind up),
-                "command_rate_limit"
+                "integrator_limit", "anti_windup" (a torque limit at which the integrator does not wind up),
+                "command_rate"
     value       the number of the cause: initial integral [N m], factor, samples of shift, limit [N m], rate [rad/s^2]; nan for
                 the others
     departs     first sample at which the configured controller departs from the log; None: it does not

@@ -13,7 +13,6 @@ from gaident.axis import Text, joined, say
 from gaident.control.filtering import filtered, rate_limited
 from gaident.control.pi import PI
 from gaident.control.pi_torque import HOLDS, held_torque, pi_torque
-from gaident.diagnosis.library.settings import OF_SETTING
 from gaident.identification.adequacy import white_lags
 from gaident.identification.noise import chi2_tail, ljung_box
 from gaident.policy.table import POLICY
@@ -159,7 +158,7 @@ def _limits(case: _Case) -> Iterator[Explanation]:
         if not acting:
             continue
         sentence = say("It does with the integral clamped to {:.4g} {N m}{}; the clamp acts at {} samples.", clamp, more, acting)
-        yield Explanation(torque, OF_SETTING["integrator_limit"], clamp, sentence, controller=limited)
+        yield Explanation(torque, "integrator_limit", clamp, sentence, controller=limited)
 
 
 def _limited(case: _Case) -> list[PI]:
@@ -238,7 +237,7 @@ def _rate(case: _Case) -> Iterator[Explanation]:
         limited = rate_limited(case.command, rate, case.dt, start)
         torque = pi_torque(limited, case.velocity, case.dt, case.controller)
         sentence = say("It does with the command limited to a slope of {:.4g} {rad/s^2} ahead of the controller.", rate)
-        yield Explanation(torque, OF_SETTING["command_rate"], rate, sentence)
+        yield Explanation(torque, "command_rate", rate, sentence)
 
 
 def _linear(case: _Case) -> Iterator[Explanation]:
