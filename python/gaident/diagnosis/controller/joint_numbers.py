@@ -60,6 +60,6 @@ def joint_numbers(found: Selection, compared: Callable[[Selection, Fit], Selecti
     if not joint.score(best) < found.space.score(found.final) - found.space.policy.swap:
         return None
     moved = best.predictor.data
-    here = replace(found.space, objective=replace(found.space.objective, data=moved), grown={})
+    here = replace(found.space, objective=replace(found.space.objective, data=moved))
     base = here.refitted(found.base.hypothesis.over(moved), found.base.x)
     return compared(replace(found, space=here, base=base, final=best, rivals={}, whitened=None), best)

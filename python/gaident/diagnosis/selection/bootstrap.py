@@ -43,7 +43,7 @@ def largest_gains(space: Moves, base: Fit, final: Fit, draws: int, seed: int, no
         noise = [left.coloured(rng.choice(pool, 2 * n))[-n:] for n in objective.lengths]
         drawn = Objective(objective.data, objective.weight, objective.family, clean + np.concatenate(noise))
         start = reestimated(drawn, fit(drawn, base.hypothesis, base.x, WHITE, space.policy.usual))
-        found = replace(space, objective=drawn, note=lambda _: None, grown={}).add(start)
+        found = replace(space, objective=drawn, note=lambda _: None).add(start)
         gains[k] = start.bic - min(f.bic for f in found) if found else -np.inf
     return gains
 

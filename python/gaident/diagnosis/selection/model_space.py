@@ -11,7 +11,7 @@ decision of the search; its numbers stand in the policy.
 from __future__ import annotations
 
 from collections.abc import Callable, Hashable, Iterable
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -60,7 +60,6 @@ class ModelSpace:
     policy: Policy = POLICY
     shown: frozenset[str] = frozenset()  # families of effects that the records show by themselves
     rigid_below: float = 0.0  # rad/s, below which the records show one rigid body
-    grown: dict[Hashable, list[Fit]] = field(default_factory=dict)
 
     # What a model is worth.
 

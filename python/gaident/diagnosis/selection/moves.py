@@ -89,14 +89,17 @@ class Moves(SideMoves):
         if len(now.effects) >= self.policy.most_effects:
             return []
         key = "add", now.key, self.allowed
-        self.grown.setdefault((now.parameters.kind, frozenset(now.effects)), []).append(now)
+        self._grown(now).append(now)
         return self.objective.once(key, lambda: self._best(now, [*self.ground(now), *self.with_a_load(now), *self._add(now)]))
 
     def known(self, fit: Fit) -> Fit:
         """A fit of the same model that was grown already, where it is no worse by what swaps a place: its growth is known."""
-        same = self.grown.get((fit.parameters.kind, frozenset(fit.effects)), [])
-        near = [f for f in same if f.bic < fit.bic + self.policy.swap]
+        near = [f for f in self._grown(fit) if f.bic < fit.bic + self.policy.swap]
         return min(near, key=lambda f: f.bic) if near else fit
+
+    def _grown(self, fit: Fit) -> list[Fit]:
+        """The fits of the same model over this objective that were grown."""
+        return self.objective.once(("grown", fit.parameters.kind, frozenset(fit.effects), self.allowed), list)
 
     def _add(self, now: Fit) -> list[Fit]:
         self.note(f"looking beyond {words(now.effects) or 'the linear model'}")

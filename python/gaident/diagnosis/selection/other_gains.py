@@ -222,7 +222,7 @@ def under_given(found: Selection, given: PI, gains: int) -> Selection | None:
     """
     space = found.space
     data = space.data.under(given)
-    here = replace(space, objective=replace(space.objective, data=data), grown={})
+    here = replace(space, objective=replace(space.objective, data=data))
 
     def moved(fit: Fit) -> Fit:
         return here.refitted(fit.hypothesis.over(data), fit.x)

@@ -211,7 +211,7 @@ def _score_beside(again: Selection, found: Selection) -> float:
 
 def _score_under(data: DataSet, final: Fit, space: Moves) -> float:
     """Score of a model over these data, fitted again, under the errors of a search."""
-    space = replace(space, objective=replace(space.objective, data=data), grown={})
+    space = replace(space, objective=replace(space.objective, data=data))
     return space.score(space.refitted(final.hypothesis.over(data), final.x))
 
 
