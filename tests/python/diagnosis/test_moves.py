@@ -17,7 +17,7 @@ from scipy.stats import chi2
 
 import gaident as ga
 from gaident.control.controller import Limiting
-from gaident.diagnosis.selection import model_space, moves, score_test, select, side_moves
+from gaident.diagnosis.selection import mechanisms, model_space, moves, score_test, select, side_moves
 from gaident.diagnosis.selection.bases import Task
 from gaident.diagnosis.selection.bootstrap import largest_gains
 from gaident.diagnosis.selection.rivals import Replacement, rivals_of
@@ -575,6 +575,34 @@ def test_an_effect_of_the_shaft_goes_to_the_other_side_where_it_explains_more() 
     assert bench.space.demote(far) == []
     only = Bench({"far": (0.6,)}, masses=2, allowed=(A,)).space
     assert not only.may(FAR) and bench.space.may(FAR)
+
+
+def test_a_load_makes_two_masses_of_one_with_its_effects_at_the_far_end(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(model_space.ModelSpace, "swings", lambda space, fit: True)  # the toy's numbers are no mechanism
+    bench = Bench({"far": (0.6,)}, masses=2, allowed=(NEAR, A))
+    one = bench.fit(NEAR, masses=1)
+    (loaded,) = bench.space.with_a_load(one)
+    assert loaded.parameters.masses == 2 and loaded.effects == ("far",)
+    assert loaded.x[-1] == pytest.approx(0.6, abs=0.02) and bench.space.score(loaded) < bench.space.score(one)
+    assert ("far",) in names(bench.space.add(one)), "add tries it, too"
+    assert bench.space.with_a_load(bench.fit(NEAR)) == [], "two masses have a load"
+    assert bench.space.with_a_load(bench.fit(A, masses=1)) == [], "what is not of the shaft has no other end"
+    still = Bench({"near": (0.6,)}, allowed=(NEAR, A))
+    assert still.space.with_a_load(still.fit(NEAR)) == [], "nothing is left to explain"
+
+
+def test_elsewhere_looks_for_the_resonance_of_two_masses_beside_their_effects(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(mechanisms, "LIBRARY", LIBRARY)
+    bench = Bench({"a": (0.4,)}, masses=2, allowed=(A, GAP))
+    there = bench.fit(A)
+    (other,) = bench.space.elsewhere(there)
+    assert other.parameters.masses == 2 and other.effects == ("a",)
+    assert other.x[-1] == pytest.approx(0.4, abs=0.02)
+    assert bench.space.settled(there) is min((there, other), key=bench.space.score)
+    without = bench.space.elsewhere(bench.fit(A, GAP))
+    assert names(without) == [("a",)], "what may stand for a resonance at the wrong place is left out"
+    assert bench.space.elsewhere(bench.fit()) == [] and bench.space.elsewhere(bench.fit(A, masses=1)) == []
+    assert bench.space.elsewhere(bench.fit(A, FAR)) == []
 
 
 def test_dry_friction_is_tried_at_both_ends() -> None:

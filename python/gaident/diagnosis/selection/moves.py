@@ -13,6 +13,7 @@ A model is a mechanism (one mass or two) with effects. The moves are
     demote      two masses to one, or the spring away
     close       the open loop to the closed one
     search      the same model again, from all starts and globally, beside stops and impacts
+    elsewhere   two masses with the same effects, with another resonance
 
 Whether an effect is added is one decision, `ModelSpace.worth`; a search of the same model goes by its BIC alone.
 """
