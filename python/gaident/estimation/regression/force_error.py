@@ -233,11 +233,7 @@ def _torques(
 
 def effects_before_the_shaft(model: Model) -> list[str]:
     """Effects between the logged torque and the shaft: of the actuator, and a sensor's filter, which acts like a lag there."""
-    return [e.name for e in model.effects if e.row.place == "actuator" or (e.row.place == "sensor" and not _turns(e.parameters))]
-
-
-def _turns(parameters: object) -> bool:
-    return "order" in parameters  # type: ignore[operator]
+    return [e.name for e in model.effects if e.row.place == "actuator" or (e.row.place == "sensor" and not e.row.turns)]
 
 
 def _at_shaft(model: Model, rec: Record) -> Vector:
