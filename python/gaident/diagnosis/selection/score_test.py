@@ -174,11 +174,13 @@ class ScoreTest:
         first, last = term.orders
         per_period = TURN / (self.data.period or TURN)  # 1 but on a linear axis, whose orders count in its pitch
         orders = np.arange(float(first if per_period == 1.0 else 1), last + 1.0) * per_period
-        # Seen is what passes a few times, slowly enough for the sampling at the speeds that matter: there and back counts twice,
-        # but most of a turn has to be there. A single order once per turn is gravity, which a sixth of a turn shows.
+        # Seen is what passes a few times, slowly enough for the sampling at the speeds that matter: there and back counts twice.
+        # Of the first order most of a period has to be there, of the others some: a curve of another kind over part of a turn is
+        # a wave of one order or another. A single order once per turn is gravity, which a sixth of a turn shows.
         turned, path = float(np.ptp(angle)), float(np.abs(np.diff(angle)).sum())
         per_sample = float(np.median(np.abs(self.objective.measured)) + 1e-12) * self.data.dt
-        seen = (orders * turned > POLICY.seen_turn * TURN) & (orders * path > POLICY.seen_path * TURN)
+        travelled = np.where(orders > per_period, POLICY.seen_periods, POLICY.seen_turn) * TURN
+        seen = (orders * turned > travelled) & (orders * path > POLICY.seen_path * TURN)
         if last == 1:
             seen |= turned > POLICY.gravity_turn * TURN
         orders = orders[seen & (orders * per_sample < POLICY.seen_band * np.pi)]
