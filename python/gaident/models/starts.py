@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from gaident.axis import Text, say
 from gaident.control.controller import Controller
 from gaident.data.record import Record
+from gaident.data.signals.lattice import changes
 from gaident.policy.table import POLICY
 
 __all__ = ["constant_beside", "doubtful_start", "noise_std", "starts_moving", "stretches"]
@@ -30,7 +31,7 @@ def noise_std(velocity: NDArray[np.float64], step: float = 0.0) -> float:
 
 def _outside_runs(x: NDArray[np.float64]) -> NDArray[np.bool_]:
     """Of each four neighbouring samples, whether none of them is part of a run of four equal values or more."""
-    same = np.diff(x) == 0.0
+    same = changes(x) == 0.0
     four = same[:-2] & same[1:-1] & same[2:]  # samples i to i + 3 are equal
     in_run = np.zeros(len(x), dtype=bool)
     for k in range(4):
@@ -90,10 +91,10 @@ def _constant_input(rec: Record, controller: Controller | None) -> bool:
 
 def _first_is_motion(rec: Record, controller: Controller | None) -> bool:
     w = rec.velocity
-    steps = np.concatenate([np.abs(np.diff(part)) for part in stretches(w)])
-    moves = steps[steps > 0.0]
+    steps = np.concatenate([changes(part) for part in stretches(w)])
+    moved = steps[steps > 0.0]
     # Repeats betray a quantised signal.
-    quantum = float(moves.min()) if len(moves) and len(moves) < POLICY.repeats * len(steps) else 0.0
+    quantum = float(moved.min()) if len(moved) and len(moved) < POLICY.repeats * len(steps) else 0.0
     top = max(float(w.max()), -float(w.min()))
     tolerance = max(POLICY.above_noise * noise_std(w), POLICY.rest_steps * quantum, POLICY.negligible * top)
     first = float(w[0])

@@ -13,8 +13,10 @@ import gaident as ga
 import gaident.identification.replay.replay as replay_module
 from friction_drive import CONTROLLER, DRIVE, DT, drive_record
 from gaident.control.pi_torque import held_torque
+from gaident.diagnosis.controller.as_read import outliers_of_the_log
 from gaident.diagnosis.records.hygiene import outliers
 from gaident.identification.replay.replay import Replay, replay
+from gaident.models.starts import noise_std
 
 J, D = 5e-4, 2e-3
 LEVELS = np.repeat((60.0, -60.0, 20.0, -40.0, 60.0, -20.0), 120)
@@ -71,6 +73,38 @@ def test_outliers_are_found_on_slopes_and_side_by_side_and_only_where_the_model_
     spikes[at] = (3.0, 8.0, 5.0, -4.0, -9.0)
     np.testing.assert_array_equal(outliers(signal + noise + spikes, noise + spikes), at)
     assert len(outliers(signal + noise + spikes, noise)) == 0  # the model does the same
+
+
+def test_what_a_difference_of_counts_loses_to_rounding_is_no_step_of_the_encoder() -> None:
+    """(theta(n) - theta(n-1))/dt holds its value but for the last digits, where the angle is much larger than a step of it."""
+    n = np.arange(4000)
+    counts = np.floor(3000.0 * np.sin(n / 60.0)) * (n < 1200) + np.floor(0.02 * n)  # it moves, then a count now and then
+    q = 2.0 * np.pi / 10000.0
+    dusty, exact = np.diff(counts * q) / DT, np.diff(counts) * (q / DT)
+    steps = np.abs(np.diff(dusty))
+    assert 0.0 < steps[steps > 0.0].min() < 1e-9 * q / DT
+    np.testing.assert_array_equal(outliers(dusty), outliers(exact))
+    assert noise_std(dusty) == pytest.approx(noise_std(exact), rel=1e-9)
+
+
+@pytest.mark.parametrize("read", [False, True], ids=["of the log alone", "read by the controller"])
+def test_at_the_rate_of_the_log_the_torque_says_whether_the_controller_read_an_outlier(read: bool) -> None:
+    rec = limited_drive(10.0)
+    rng, at = np.random.default_rng(3), np.array([90, 200, 333, 471, 600])
+    spikes = np.zeros(len(rec))
+    spikes[at] = rng.choice([-1.0, 1.0], len(at)) * rng.uniform(10.0, 30.0, len(at))
+    spoiled = rec.with_channels(velocity=rec.velocity + spikes)
+    if read:
+        spoiled = spoiled.with_channels(torque=CONTROLLER.torque_of(spoiled))
+    (clean,), (lines,) = outliers_of_the_log([spoiled], CONTROLLER)
+    if read:
+        assert clean is spoiled and len(lines) == 0
+        return
+    np.testing.assert_array_equal(lines, at)
+    np.testing.assert_allclose(clean.velocity, rec.velocity, atol=1e-9)
+    dia = ga.diagnose(spoiled, CONTROLLER)
+    assert dia.verdict == "adequate" and [f.effect for f in dia.findings] == ["outliers"], dia.summary()
+    assert dia.mechanics["inertia"].value == pytest.approx(J, rel=2e-3)
 
 
 def test_a_replay_is_made_once_for_a_record_and_kept_no_longer_than_it() -> None:

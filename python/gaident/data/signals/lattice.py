@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from gaident.policy.table import POLICY
 
-__all__ = ["digits_step", "encoder_lines", "encoder_step", "lattice_step", "place_step", "rounding_step"]
+__all__ = ["changes", "digits_step", "encoder_lines", "encoder_step", "lattice_step", "place_step", "rounding_step"]
 
 Vector = NDArray[np.float64]
 
@@ -18,6 +18,12 @@ PLACES = (1.0, np.pi / 180.0, 2.0 * np.pi, 1e-3)  # no decision: units of positi
 EXACT = 1e-4  # no decision: steps, what a decimal number is exact to in binary and scaled by ten
 
 DIGITS = range(1, 10)  # no decision: significant digits that text logs are written with; more round off nothing that matters
+
+
+def changes(values: Vector) -> Vector:
+    """By how much neighbouring samples differ, without sign (n - 1,); 0 where that is what a sum in floating point loses."""
+    steps = np.abs(np.diff(values))
+    return np.where(steps > SAME * float(np.abs(values).max(initial=0.0)), steps, 0.0)
 
 
 def lattice_step(values: Vector, rounded: bool = False) -> float:

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from gaident.control.pi import PI
 from gaident.data.record import Record
-from gaident.data.signals.lattice import lattice_step
+from gaident.data.signals.lattice import changes, lattice_step
 from gaident.models.model import Model
 from gaident.models.simulate import simulate
 from gaident.policy.table import POLICY
@@ -58,7 +58,7 @@ def _leaving(w: Vector, error: Vector | None) -> NDArray[np.intp]:
         return np.zeros(0, dtype=np.intp)
     middle = _middle(w)
     spread = ROBUST * float(np.median(np.abs(middle - np.median(middle))))
-    steps = np.abs(np.diff(w))
+    steps = changes(w)
     quantum = float(steps[steps > 0.0].min()) if np.any(steps > 0.0) else 0.0
     size, least = np.abs(middle), POLICY.outlier_far * max(spread, quantum)
     left = (size > least) & _missed(w, middle, least) & _missed(w[::-1], middle[::-1], least)[::-1]
