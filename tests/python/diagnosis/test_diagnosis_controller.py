@@ -75,6 +75,17 @@ def test_outliers_are_found_on_slopes_and_side_by_side_and_only_where_the_model_
     assert len(outliers(signal + noise + spikes, noise)) == 0  # the model does the same
 
 
+def test_a_factor_of_the_torque_says_what_else_would_be_as_much_larger() -> None:
+    """Gains both wrong by one factor and a wrong unit of the torque are the same to the log."""
+    rec = limited_drive(10.0)
+    dia = ga.diagnose(rec.with_channels(torque=1.25 * rec.torque), CONTROLLER)
+    assert dia.controller.kp == pytest.approx(1.25 * CONTROLLER.kp, rel=1e-6)
+    assert dia.mechanics["inertia"].value == pytest.approx(1.25 * J, rel=1e-2)
+    assert "If the gains are as given, inertia, friction and every other torque below are 0.8 times as large." in " ".join(
+        dia.notes
+    )
+
+
 def test_what_a_difference_of_counts_loses_to_rounding_is_no_step_of_the_encoder() -> None:
     """(theta(n) - theta(n-1))/dt holds its value but for the last digits, where the angle is much larger than a step of it."""
     n = np.arange(4000)

@@ -12,7 +12,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from gaident.axis import Text, called, say, unit_text
+from gaident.axis import Text, called, joined, say, unit_text
 from gaident.control.controller import Controller
 from gaident.control.pi import PI
 from gaident.control.pi_torque import HOLDS, held_torque, pi_torque
@@ -96,6 +96,12 @@ def as_logged(records: Sequence[Record], controller: PI | None) -> AsLogged:
             controller.kp,
             controller.ki,
         )
+    if all(r.cause == "scale" for r in off):
+        either = (
+            " The log does not say whether the gains are wrong or a factor of the {torque} (its unit, a rated {torque}, a {torque} "
+            "constant). If the gains are as given, {inertia}, friction and every other {torque} below are {:.4g} times as large."
+        )
+        used = joined("", (used, say(either, controller.kp / kp)))
     shown = replace(controller, kp=kp, ki=ki)
     return AsLogged(shown, (off[0].sentence, used), (_gains_finding(logged, shown, replays),))
 
