@@ -6,8 +6,9 @@ the logged torque, and the numbers are those with the least squares of what is l
     d(k) = u_logged(k) - u(k; numbers),   k where no limit acts;   c(k) = d(k) - rho d(k-1),   sum (c - mean c)^2 -> min
 
 The mean is taken of each stretch between two limits: what the integrator stored before it is free.
-Between the lines of a slower log the velocity follows a cubic spline. What it really did there is lost and adds up in the
-integrator: d is then a random walk, and rho, its correlation from line to line, says how far (Cochrane and Orcutt 1949).
+Between the lines of a slower log the velocity follows a cubic spline.
+What it really did there is lost and adds up in the integrator: d is then a random walk, and rho,
+its correlation from line to line, says how far (Cochrane and Orcutt 1949).
 The gains are linear in u: for given filters and position gain they start from a linear least squares (`_linear_start`).
 """
 

@@ -1,7 +1,8 @@
 """Every move of the search by itself, over a toy objective: its models are sums of given signals, and nothing is simulated.
 
-The toy has a predictor of its own. The velocity of a model is the sum of a signal for each base parameter and of a shape for each
-effect, so that the truth is known, and what a fit may find too.
+The toy has a predictor of its own.
+The velocity of a model is the sum of a signal for each base parameter and of a shape for each effect,
+so that the truth is known, and what a fit may find too.
 """
 
 from __future__ import annotations
@@ -643,7 +644,7 @@ def test_one_mass_with_a_resonance_is_two_masses() -> None:
     assert bench.space.canonical(bench.fit(A)).parameters.masses == 1
 
 
-def test_resettled_puts_the_resonance_into_the_two_masses_alone_and_with_a_simple_effect() -> None:
+def test_as_own_resonance_puts_the_resonance_into_the_two_masses_alone_and_with_a_simple_effect() -> None:
     actuator = toy("c", [(0.5,)], place="actuator")
     bench = Bench({"c": (0.4,)}, masses=2, allowed=(A, actuator, GENERAL, RESONANCE))
     tries = bench.space.resettled(bench.fit(RESONANCE))
@@ -656,7 +657,7 @@ def test_resettled_puts_the_resonance_into_the_two_masses_alone_and_with_a_simpl
 # The same model again.
 
 
-def test_only_a_resonance_that_leads_is_resettled(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_only_a_resonance_that_leads_becomes_the_mechanisms_own(monkeypatch: pytest.MonkeyPatch) -> None:
     asked: list[tuple[str, ...]] = []
 
     def resettled(space: moves.Moves, fit: Fit) -> list[Fit]:

@@ -77,8 +77,8 @@ def _answered(rec: Record, lines: Lines, cascade: Cascade) -> Record:
 
         torque - made(w) = sum over lines k of x_k d made/d w_k,   w_k + x_k
 
-    Interpolated ones lack the noise that the controller read. Fitted is what changes from line to line: the velocity between the
-    lines, which is lost, adds up in the integral.
+    Interpolated ones lack the noise that the controller read.
+    Fitted is what changes from line to line: the velocity between the lines, which is lost, adds up in the integral.
     """
 
     def made(velocity: Vector) -> Vector:

@@ -1,7 +1,7 @@
 """What the logged torque says of the controller, decided without a plant: gains, limits, effects at its place.
 
-Where the log follows from command and velocity through the controller, nothing of it needs a plant any more. Where it follows
-only with other gains, these are used; where only with a limit, that is a finding.
+Where the logged torque follows from command and velocity through the controller, no plant is needed to explain it.
+Where it follows only with other gains, these are used. Where it follows only with a limit, that limit is a finding.
 """
 
 from __future__ import annotations

@@ -5,9 +5,10 @@ first order is, where a line of the log is taken before (d = 1) or after (d = 0)
 
     u_m(n) = a u_m(n-1) + (1 - a) u(n-d) + I0 + noise,   a = exp(-T/tau)
 
-tau is fitted, I0 is what the integrator stored before the record. Compared with this is the same torque without a lag, d samples
-late and with other gains, by the information criterion with the noise of each, on the same lines of the log: none at the torque
-limit, and of each record none of the first, which a log without a lag may lack.
+tau is fitted, I0 is what the integrator stored before the record.
+Compared with this is the same torque without a lag, d samples late and with other gains,
+by the information criterion with the noise of each, on the same lines of the log:
+none at the torque limit, and of each record none of the first, which a log without a lag may lack.
 A torque that is only late has a = 0: a lag is found where a is beyond its deviations, as tau is above 0 whatever the log says,
 and where no whole number of lines by which the torque is late comes near in that criterion.
 Where the lag explains the log no worse, no gains are said to be other, and the torque that the controller makes drives the model:

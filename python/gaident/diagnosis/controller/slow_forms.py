@@ -1,7 +1,8 @@
 """A controller that a log of fewer lines shows, run whole on the logged signals: what it does at its torque limit.
 
-The regression of the form leaves out the lines at a limit. What the integrator does there is told by running the controller, with
-each of the schemes that `PI` knows, over the whole record: the scheme with the least squares of what is left of the torque.
+The regression of the form leaves out the lines at a limit.
+What the integrator does there is told by running the controller, with each of the schemes that `PI` knows, over the whole record:
+the scheme with the least squares of what is left of the torque.
 """
 
 from __future__ import annotations
@@ -72,7 +73,7 @@ def limited(records: Sequence[Record], controller: Cascade) -> Limited:
     """The controller with the plateau of the logged torques as its limit, and the anti-windup that comes closest.
 
     At a given limit it is the given anti-windup, where none of them comes closer by the share that a number has to take away.
-    Where the torques follow without a limit, as far as their log tells, a plateau of theirs is none: the top of a swing is flat.
+    Where the torques follow without a limit, as well as their log can show, a plateau is no limit: the top of a swing is flat.
     """
     filters_unseen = controller.torque_filters and controller.log_every(records[0].dt) > 1
     given = controller.velocity.torque_limit

@@ -1,13 +1,14 @@
-"""Which values what is left can have bent.
+"""Which values of the mechanism the remaining error can have biased.
 
 With whitened errors v, slopes J of the parameters and C of the free functions of the signal that drives what is left, the
 parameters beside these functions are those of
 
     min |v - J'd - C'c|^2 over d, c
 
-so that a value s'x of the mechanism moves by s'd. It can have been bent where |s'd| is more than its standard deviation, and
-where nothing but the free functions, or they as well as the value, explain the record: then no d is determined along s.
-A ripple of the position, for one, is no function that an inertia could take the place of.
+so that a value s'x of the mechanism moves by s'd.
+It can be biased where |s'd| is more than its standard deviation.
+It can also be biased where the free functions alone explain what the value explains: then no d is determined along s.
+A ripple of the position, for example, does not bias an inertia.
 """
 
 from __future__ import annotations

@@ -4,8 +4,9 @@ Without a logged torque a model is driven by what the given PI makes of command 
 
     e = r - w,   u = kp (e + ki/kp int e dt),   w_model = G(u)
 
-A common factor of kp and ki is one of u: inertia and torques of the model take it, and no record shows it. The ratio ki/kp does
-show, and wrong it leaves errors of the command's shape, or looks like mechanics. Of a PI with limits, kp itself shows too.
+A common factor of kp and ki scales u; inertia and torques of the model scale with it, and no record shows it.
+The ratio ki/kp does show: a wrong one leaves errors of the command's shape, or looks like mechanics.
+With limits in the PI the record also shows kp itself.
 
 The hypothesis is a model with some of the selected effects under a PI with
 

@@ -4,9 +4,10 @@
     cov   = (X'X)^-1 S (X'X)^-1
     S     = sum_j k(j) sum_i (x_i r_i)(x_i-j r_i-j)',   k(j) = 1 - |j|/(L + 1) for |j| <= L       (Newey and West 1987)
 
-L = 1.3 sqrt(n), as Lazarus, Lewis, Stock and Watson (2018) recommend for tests. No deviation is smaller than that of
-white residuals. Columns are chosen by the criterion of all models (estimation/criterion.py), with the independent samples of
-the residuals. Theory: docs/theory/inverse-dynamics.md.
+L = 1.3 sqrt(n), as Lazarus, Lewis, Stock and Watson (2018) recommend for tests.
+No deviation is smaller than that of white residuals.
+Columns are chosen by the criterion of all models (estimation/criterion.py), with the independent samples of the residuals.
+Theory: docs/theory/inverse-dynamics.md.
 
 W. K. Newey, K. D. West, Econometrica 55(3):703-708, 1987.
 E. Lazarus, D. J. Lewis, J. H. Stock, M. W. Watson, Journal of Business and Economic Statistics 36(4):541-559, 2018.

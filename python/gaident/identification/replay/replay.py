@@ -1,7 +1,7 @@
 """Controller replay: run again on the measured velocity; does the logged torque follow from it?
 
-No plant is needed: what the controller does is decided before any mechanism is considered. Where the
-logged torque does not follow from a bare PI, `causes` looks for the simple reasons.
+No plant is needed: what the controller does is decided before any mechanism is considered.
+Where the logged torque does not follow from a bare PI, `causes` looks for the simple reasons.
 
 A diagnosis asks for the replay of a record in several places: each is kept for as long as its record is.
 """
@@ -73,8 +73,8 @@ _KEPT: MutableMapping[Record, dict[Controller | None, Replay]] = WeakKeyDictiona
 def replay(rec: Record, controller: Controller | None) -> Replay:
     """Runs the controller again on the measured velocity and compares with the logged torque.
 
-    controller: None for the open loop, where the record's torque is returned as it is. Raises RecordError where neither a
-    torque nor what makes one is there.
+    controller: None for the open loop, where the record's torque is returned as it is.
+    Raises RecordError where neither a torque nor what makes one is there.
     """
     kept = _KEPT.setdefault(rec, {})
     if controller not in kept:
@@ -154,8 +154,9 @@ def _compared(rec: Record, command: Vector, controller: Controller, logged: Vect
 def velocity_steps(records: Sequence[Record]) -> tuple[tuple[float, ...], ...]:
     """Steps [rad/s] that the velocities of each record may be rounded to by the log, one tuple an assumption, the finest first.
 
-    The digits of a text log are its rounding. A lattice beside them is the log's too (16 bits of a reference speed), or it is
-    the encoder's, and then the controller read the same numbers. A torque that follows to the digits shows which.
+    The digits of a text log are its rounding.
+    A lattice beside them is the log's too (16 bits of a reference speed), or it is the encoder's,
+    and then the controller read the same numbers. A torque that follows to the digits shows which.
     """
     ranges = [POLICY.negligible * float(np.ptp(r.velocity)) for r in records]
     fine, coarse = (
@@ -175,9 +176,9 @@ class Allowed:
     """What a log's rounding makes of a replay, at most.
 
     step: that the log rounds velocities to [rad/s]; it does not round a command more coarsely.
-    torque: steps of the torque's rounding, and what rounded velocity, command and positions do to P part and integral [N m]. Each
-    of N velocities is rounded by itself, a command once for all the samples that it is held; the integrator adds up what is off,
-    evenly within +-q/2:
+    torque: steps of the torque's rounding, and what rounded velocity, command and positions do to P part and integral [N m].
+    Each of N velocities is rounded by itself, a command once for all the samples that it is held;
+    the integrator adds up what is off, evenly within +-q/2:
 
         sum of the squares = ki^2 dt^2 (N q_w^2 + sum L_i^2 q_r^2)/12        L_i: samples for which a command is held
 
@@ -248,7 +249,10 @@ def _of_signals(rec: Record, command: Vector, controller: VelocityGains, q_w: fl
 
 
 def rounding_of(rec: Record, command: Vector, controller: PI, logged: Vector, step: float) -> float:
-    """Root mean square of what rounding makes of a replay [N m]: a torque of d digits is off by its own last one."""
+    """Root mean square of what rounding makes of a replay [N m].
+
+    A torque printed with d digits is off by one unit of the last digit.
+    """
     size, own = np.abs(logged), rounding_step(logged)
     steps = np.full(len(logged), own)
     if own > 0.0 and lattice_step(logged) == 0.0:
