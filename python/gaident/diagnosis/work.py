@@ -141,7 +141,7 @@ class Work:
             self.take(compared(found, simpler, self._equivalent_here, self._say))
         self._doubt_controller()
 
-    def settle(self, found: Selection) -> None:
+    def accept(self, found: Selection) -> None:
         """Take this as the result of the search, and look whether another controller would explain the records better."""
         self.take(found)
         self._doubt_controller()
@@ -213,9 +213,9 @@ class Work:
         """The result of a search, and what it leaves."""
         self.found, self.base, self.rivals = found, found.base, found.rivals
         self.data, self.objective = found.space.data, found.space.objective
-        self._settle(found.final)
+        self._set_final(found.final)
 
-    def _settle(self, final: Fit) -> None:
+    def _set_final(self, final: Fit) -> None:
         self.final = final
         self.adequate, self.left = what_is_left(self.found.space, final)
         self.under, self.estimate = self.found.estimated()

@@ -23,7 +23,7 @@ __all__ = ["Sums", "assess", "independence_p", "regressor_lags", "white_lags"]
 
 Vector = NDArray[np.float64]
 
-LAGS = (0, 1, 2, 4, 8, 16, 32)  # no decision: of the input, which a test looks at
+INPUT_LAGS = (0, 1, 2, 4, 8, 16, 32)  # no decision: of the input, which a test looks at
 
 
 @dataclass(frozen=True)
@@ -51,7 +51,7 @@ def regressor_lags(lengths: Sequence[int], open_loop: bool) -> list[int]:
     lag 0 would then be correlated with the residual by construction and is left out.
     """
     # no decision: lags that a record can show; the test has a level
-    return [k for k in LAGS if k < min(lengths) // 4 and not (open_loop and k == 0)]
+    return [k for k in INPUT_LAGS if k < min(lengths) // 4 and not (open_loop and k == 0)]
 
 
 def white_lags(lengths: Sequence[int]) -> int:

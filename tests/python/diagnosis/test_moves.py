@@ -599,7 +599,7 @@ def test_elsewhere_looks_for_the_resonance_of_two_masses_beside_their_effects(mo
     (other,) = bench.space.elsewhere(there)
     assert other.parameters.masses == 2 and other.effects == ("a",)
     assert other.x[-1] == pytest.approx(0.4, abs=0.02)
-    assert bench.space.settled(there) is min((there, other), key=bench.space.score)
+    assert bench.space.with_best_resonance(there) is min((there, other), key=bench.space.score)
     without = bench.space.elsewhere(bench.fit(A, GAP))
     assert names(without) == [("a",)], "what may stand for a resonance at the wrong place is left out"
     assert bench.space.elsewhere(bench.fit()) == [] and bench.space.elsewhere(bench.fit(A, masses=1)) == []
@@ -647,11 +647,11 @@ def test_one_mass_with_a_resonance_is_two_masses() -> None:
 def test_as_own_resonance_puts_the_resonance_into_the_two_masses_alone_and_with_a_simple_effect() -> None:
     actuator = toy("c", [(0.5,)], place="actuator")
     bench = Bench({"c": (0.4,)}, masses=2, allowed=(A, actuator, GENERAL, RESONANCE))
-    tries = bench.space.resettled(bench.fit(RESONANCE))
+    tries = bench.space.as_own_resonance(bench.fit(RESONANCE))
     assert names(tries) == [(), ("c",)], "neither at the shaft nor of more than one number"
     assert all(f.parameters.masses == 2 for f in tries)
     assert min(tries, key=bench.space.score).effects == ("c",)
-    assert bench.space.resettled(bench.fit(A)) == [] and bench.space.resettled(bench.fit(RESONANCE, masses=1)) == []
+    assert bench.space.as_own_resonance(bench.fit(A)) == [] and bench.space.as_own_resonance(bench.fit(RESONANCE, masses=1)) == []
 
 
 # The same model again.
@@ -660,11 +660,11 @@ def test_as_own_resonance_puts_the_resonance_into_the_two_masses_alone_and_with_
 def test_only_a_resonance_that_leads_becomes_the_mechanisms_own(monkeypatch: pytest.MonkeyPatch) -> None:
     asked: list[tuple[str, ...]] = []
 
-    def resettled(space: moves.Moves, fit: Fit) -> list[Fit]:
+    def as_own_resonance(space: moves.Moves, fit: Fit) -> list[Fit]:
         asked.append(fit.effects)
         return []
 
-    monkeypatch.setattr(moves.Moves, "resettled", resettled)
+    monkeypatch.setattr(moves.Moves, "as_own_resonance", as_own_resonance)
     other = Bench({"a": (0.5,)}, masses=2, allowed=(A, RESONANCE))
     assert {("a",), ("resonance",)} <= set(names(other.space.add(other.fit())))
     resonance = Bench({"resonance": (70.0, 0.3, 40.0, 0.1)}, masses=2, allowed=(A, RESONANCE))

@@ -49,7 +49,7 @@ Matrix = NDArray[np.float64]
 Place: TypeAlias = tuple[str, type[LowPass] | type[Notch]]
 """(argument of `Cascade`, kind of filter)."""
 
-STEP = 1e-5  # no decision: of a filter's number, for a slope
+FILTER_STEP = 1e-5  # no decision: of a filter's number, for a slope
 PLACES: tuple[Place, ...] = (
     ("torque_filters", LowPass),
     ("torque_filters", Notch),
@@ -354,6 +354,6 @@ def least(M: Matrix, wanted: Vector) -> tuple[Vector, float]:
 
 
 def slope(f: Callable[[Vector], Vector], x: Vector, k: int) -> Vector:
-    step = STEP * max(abs(float(x[k])), 1.0)
+    step = FILTER_STEP * max(abs(float(x[k])), 1.0)
     moved = step * np.eye(len(x))[k]
     return (f(x + moved) - f(x - moved)) / (2.0 * step)

@@ -64,7 +64,7 @@ Vector = NDArray[np.float64]
 Matrix = NDArray[np.float64]
 
 INSIDE = 1e-9  # no decision: of a bound, where a search starts
-ROUNDING = 1e-9  # no decision: of the largest torque, what a sum is exact to
+SUM_ROUNDING = 1e-9  # no decision: of the largest torque, what a sum is exact to
 
 
 @dataclass(frozen=True, eq=False)
@@ -371,7 +371,7 @@ def _fitted(law: Law, best: FormCandidate, given: PI) -> tuple[Vector, Vector, M
     J = np.column_stack([table @ B @ wide, slopes])
     sizes = np.linalg.norm(J, axis=0)
     sizes[sizes == 0.0] = 1.0
-    variance = max(float(np.mean((size * off(x)) ** 2)), (ROUNDING * float(np.abs(law.logged).max())) ** 2)
+    variance = max(float(np.mean((size * off(x)) ** 2)), (SUM_ROUNDING * float(np.abs(law.logged).max())) ** 2)
     spread = variance * inverse_of(J.T @ J)
     here = np.linalg.lstsq(J / sizes, law.logged - table @ coefficients, rcond=1e-12)[0] / sizes
     for other in law.others:  # how far the numbers move with another velocity between the lines

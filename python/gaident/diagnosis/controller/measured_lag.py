@@ -41,7 +41,7 @@ Matrix = NDArray[np.float64]
 
 SAMPLES_LATE = (0, 1)  # no decision: the ways in which a log is written
 FASTEST = 0.05  # no decision: samples, the fastest lag that is searched for; no log tells its pole of 2e-9 from 0
-STEP = 1e-4  # no decision: of a lag's pole, for a slope
+POLE_STEP = 1e-4  # no decision: of a lag's pole, for a slope
 NEAR = 1e-3  # no decision: of a range's end, within which a search stands at it
 
 
@@ -85,7 +85,7 @@ def lag_shown(records: Sequence[Record], controller: PI | None) -> Lag | None:
     tau = -dt / float(np.log(a))
     if not FASTEST * (1.0 + NEAR) < tau / dt < POLICY.slowest_lag * (1.0 - NEAR):
         return None
-    step = STEP * (1.0 - a)
+    step = POLE_STEP * (1.0 - a)
     slope = (np.concatenate(_left(parts, a + step, late)) - np.concatenate(left)) / step
     std = float(np.sqrt(power / n / max(float(slope @ slope), 1e-300)))
     if not a > POLICY.check_deviations * std:

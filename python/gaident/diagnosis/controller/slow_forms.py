@@ -27,7 +27,7 @@ __all__ = ["Limited", "limited", "run_error", "too_fast"]
 
 Vector = NDArray[np.float64]
 
-ROUNDING = 1e-9  # no decision: of a torque, what a sum is exact to
+SUM_ROUNDING = 1e-9  # no decision: of a torque, what a sum is exact to
 TIMES = np.geomspace(0.3e-3, 0.3, POLICY.tracking_times)  # no decision: a start; s
 
 
@@ -107,13 +107,13 @@ def _spread(records: Sequence[Record], limit: float) -> float:
     torque = np.concatenate([r.torque for r in records if r.torque is not None])
     at_limit = np.abs(torque)[np.abs(torque) >= POLICY.at_limit * limit]
     rounded = rounding_step(torque) / float(np.sqrt(12.0))  # no decision: of an even distribution
-    return max(float(np.std(at_limit)) if len(at_limit) else 0.0, rounded, ROUNDING * limit)
+    return max(float(np.std(at_limit)) if len(at_limit) else 0.0, rounded, SUM_ROUNDING * limit)
 
 
 def _gain(records: Sequence[Record], without: Cascade, controller: Cascade) -> float:
     """BIC units by which a run with a limit is better than one without."""
     n = sum(len(r) for r in records)
-    floor = ROUNDING * float(np.concatenate([np.abs(r.torque) for r in records if r.torque is not None]).max())
+    floor = SUM_ROUNDING * float(np.concatenate([np.abs(r.torque) for r in records if r.torque is not None]).max())
     before, after = (max(run_error(records, one), floor) for one in (without, controller))
     return float(2 * n * np.log(before / after) - np.log(n))
 

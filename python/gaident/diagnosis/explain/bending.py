@@ -28,7 +28,7 @@ from gaident.results.relevance import Relevance
 
 __all__ = ["bent_by", "relevance_of"]
 
-RANK = 1e-6  # no decision: of the largest singular value: less is rounding
+SINGULAR_RANK = 1e-6  # no decision: of the largest singular value: less is rounding
 
 Matrix = NDArray[np.float64]
 
@@ -61,7 +61,7 @@ def _bent_beside(C: Matrix, objective: Objective, fit: Fit, mechanics: Mapping[s
     rows = J[moved] / sizes[moved][:, None]
     rows, rest = rows - (rows @ C.T) @ C, error - (error @ C.T) @ C
     U, values, Vt = np.linalg.svd(rows, full_matrices=False)
-    known = values > RANK
+    known = values > SINGULAR_RANK
     step = np.zeros(len(fit.x))
     step[moved] = -(U[:, known] @ ((Vt[known] @ rest) / values[known])) / sizes[moved]
     base = fit.parameters.base
@@ -72,7 +72,7 @@ def _bent_beside(C: Matrix, objective: Objective, fit: Fit, mechanics: Mapping[s
             continue
         scaled = slope[of_base] / sizes[of_base]
         lost = np.abs(scaled @ U[: len(of_base), ~known]).max(initial=0.0)
-        undetermined = float(lost) > RANK * float(np.abs(scaled).max(initial=0.0))
+        undetermined = float(lost) > SINGULAR_RANK * float(np.abs(scaled).max(initial=0.0))
         if undetermined or abs(float(slope @ step[:base])) > mechanics[name].std:
             found.add(name)
     return found
@@ -98,5 +98,5 @@ def _orthonormal(rows: Matrix) -> Matrix:
     if not len(unit):
         return unit
     _, values, Vt = np.linalg.svd(unit, full_matrices=False)
-    spanned: Matrix = Vt[values > RANK * values[0]]
+    spanned: Matrix = Vt[values > SINGULAR_RANK * values[0]]
     return spanned

@@ -141,7 +141,7 @@ class Moves(SideMoves):
         reach = self.policy.beam_reach * self.penalty
         fits += [self.under_best_predictor(f) if self.score(f) < self.score(best[0]) + reach else f for f in best]
         if fits:
-            fits += self.resettled(min(fits, key=self.score))
+            fits += self.as_own_resonance(min(fits, key=self.score))
             fits += self.at_the_load(now, fits)
         return self._best(now, fits)
 
@@ -225,7 +225,7 @@ class Moves(SideMoves):
         fits = [self.refitted(h, x, self.policy.long) for h, x in starts]
         return [f for f in fits if f.cost < WORST and is_mechanism(f.parameters, f.x)]
 
-    def resettled(self, fit: Fit) -> list[Fit]:
+    def as_own_resonance(self, fit: Fit) -> list[Fit]:
         """The two masses with the resonance that was found as their own, alone or with a simple effect beside it.
 
         What delays the torque or blocks the shaft biases the resonance of two masses so far that a local fit does not return.
@@ -342,9 +342,9 @@ class Moves(SideMoves):
             fit = min((fit, self.restarted(fit, term)), key=lambda f: f.bic)
             if term.multimodal and not self.quiet(fit):
                 fit = min((fit, self.evolved(fit)), key=lambda f: f.bic)
-        return self.settled(fit)
+        return self.with_best_resonance(fit)
 
-    def settled(self, fit: Fit) -> Fit:
+    def with_best_resonance(self, fit: Fit) -> Fit:
         """The fit or, where these score better, two masses with another resonance.
 
         A fit at the wrong resonance may leave small errors: its noise filter treats the ringing that it misses as noise.

@@ -25,7 +25,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gaident.axis import Text, joined, say, unit_text
-from gaident.control.found import STEP, FoundNumbers
+from gaident.control.found import NUMBER_STEP, FoundNumbers
 from gaident.control.pi import PI
 from gaident.diagnosis.selection.moves import Moves
 from gaident.diagnosis.selection.select import Selection
@@ -205,7 +205,7 @@ class _Search:
         z, found = end
         stds = self.under.deviations(objective, found, z)
         pi = self.controller(z)
-        at_end = np.abs(z) > (1.0 - STEP) * self.reach
+        at_end = np.abs(z) > (1.0 - NUMBER_STEP) * self.reach
         rows = [("ki", pi.ki, "N m/rad"), ("kp", pi.kp, "N m s/rad")][: self.freedom]
         estimates = {
             name: Estimate(value, value * float(std), unit, bool(end))

@@ -267,7 +267,7 @@ def _as_innovations(space: Moves, fit: Fit) -> Fit:
 
     A prefilter shows no fast resonance: whitened errors do, and it is looked for again.
     """
-    return space.settled(space.finished(ls.reestimated(space.objective, ls.scored(space.objective, fit))))
+    return space.with_best_resonance(space.finished(ls.reestimated(space.objective, ls.scored(space.objective, fit))))
 
 
 def specification(space: Moves, task: Task, fit: Fit) -> Specification:

@@ -26,7 +26,7 @@ from numpy.typing import NDArray
 from gaident.axis import Text, joined, say, unit_text
 from gaident.control.cascade import Cascade
 from gaident.control.filters import LowPass, Notch
-from gaident.control.found import STEP, FoundNumbers
+from gaident.control.found import NUMBER_STEP, FoundNumbers
 from gaident.control.pi import PI
 from gaident.diagnosis.selection.moves import Moves
 from gaident.diagnosis.selection.other_gains import OTHER_GAINS
@@ -299,7 +299,7 @@ def _fitted(
         return None
     z, found = end
     zero = (under.low == 0.0) & (z == 0.0)  # drives have a weight of 0, or zeros without damping
-    at_end = (z > under.high - STEP) | ((z < under.low + STEP) & ~zero)
+    at_end = (z > under.high - NUMBER_STEP) | ((z < under.low + NUMBER_STEP) & ~zero)
     if bool(at_end.any()):
         return None
     score = space.score(found) + cost_of(len(z), objective.information) + space.penalty

@@ -26,7 +26,7 @@ Vector = NDArray[np.float64]
 Matrix = NDArray[np.float64]
 
 LAGS_PER_ROOT = 1.3  # no decision: of an estimate of variance, see above
-RANK = 1e-10  # no decision: of a solver
+SOLVER_RANK = 1e-10  # no decision: of a solver
 """Singular values below this share of the largest, of columns of equal length, are zero."""
 
 
@@ -34,7 +34,7 @@ def solve(X: Matrix, y: Vector) -> tuple[Vector, int]:
     """(theta (k,), rank): the least-squares solution of X theta = y, columns scaled to equal length first."""
     length = np.linalg.norm(X, axis=0)
     length[length == 0.0] = 1.0
-    theta, _, rank, _ = np.linalg.lstsq(X / length, y, rcond=RANK)
+    theta, _, rank, _ = np.linalg.lstsq(X / length, y, rcond=SOLVER_RANK)
     return np.asarray(theta / length), int(rank)
 
 
@@ -48,7 +48,7 @@ def covariance(X: Sequence[Matrix], residuals: Sequence[Vector]) -> Matrix:
     length = np.linalg.norm(whole, axis=0)
     scale = np.where(length > 0.0, length, 1.0)
     values, vectors = np.linalg.eigh((whole / scale).T @ (whole / scale))
-    known = values > RANK**2 * values[-1] if values[-1] > 0.0 else np.zeros(k, dtype=bool)
+    known = values > SOLVER_RANK**2 * values[-1] if values[-1] > 0.0 else np.zeros(k, dtype=bool)
     known &= values > 1e-12 * k
     inverse = (vectors[:, known] / values[known]) @ vectors[:, known].T
     middle = np.zeros((k, k))

@@ -21,7 +21,7 @@ __all__ = ["Explanation", "control_error", "explain", "rounded_command", "white_
 
 Vector = NDArray[np.float64]
 
-ROUNDING = 1e-9  # no decision: of the largest torque, what a sum is exact to
+SUM_ROUNDING = 1e-9  # no decision: of the largest torque, what a sum is exact to
 Allows: TypeAlias = Callable[[Vector, tuple[float, float], int], bool]
 """Whether what is off [N m] under limits of torque and integrator, from a sample on, is no more than rounding."""
 
@@ -186,7 +186,7 @@ def _trapezoidal(controller: PI, share: float, dt: float) -> PI:
 def _cuts(case: _Case, torque: Vector, share: float) -> bool:
     """Whether a limited torque comes closer than that of the same rule of integration without this limit, which is not exact."""
     without = case.logged - case.torque(_trapezoidal(case.controller, share, case.dt))
-    if float(np.abs(without).max()) <= ROUNDING * float(np.abs(case.logged).max()):
+    if float(np.abs(without).max()) <= SUM_ROUNDING * float(np.abs(case.logged).max()):
         return False
     return float(np.sum((case.logged - torque) ** 2)) < POLICY.better_reason**2 * float(np.sum(without**2))
 

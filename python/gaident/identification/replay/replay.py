@@ -30,7 +30,7 @@ __all__ = ["Replay", "replay", "rounding_of", "tolerance_of", "velocity_steps"]
 
 Vector = NDArray[np.float64]
 
-ROUNDING = 1e-6  # no decision: of the largest torque, what a controller in single precision is exact to
+SINGLE_PRECISION = 1e-6  # no decision: of the largest torque, what a controller in single precision is exact to
 
 
 @dataclass(frozen=True, eq=False)
@@ -163,7 +163,7 @@ def velocity_steps(records: Sequence[Record]) -> tuple[tuple[float, ...], ...]:
         tuple(q if q < most else 0.0 for q, most in zip((step(r.velocity) for r in records), ranges, strict=True))
         for step in (digits_step, rounding_step)
     )
-    return (fine,) if np.allclose(fine, coarse, rtol=ROUNDING, atol=0.0) else (fine, coarse)
+    return (fine,) if np.allclose(fine, coarse, rtol=SINGLE_PRECISION, atol=0.0) else (fine, coarse)
 
 
 def tolerance_of(rec: Record, command: Vector, controller: VelocityGains, logged: Vector, step: float) -> float:
@@ -195,7 +195,7 @@ class Allowed:
     def of(
         cls, rec: Record, command: Vector, controller: VelocityGains, logged: Vector, step: float, placed: float = 0.0
     ) -> Allowed:
-        own = POLICY.replay_steps * rounding_step(logged) + ROUNDING * float(np.abs(logged).max())
+        own = POLICY.replay_steps * rounding_step(logged) + SINGLE_PRECISION * float(np.abs(logged).max())
         at_once, drift = _of_signals(rec, command, controller, step)
         sample = controller.ki * rec.dt * (step + _of_command(command, step))
         error = controller.kp * (command - rec.velocity)
@@ -259,5 +259,5 @@ def rounding_of(rec: Record, command: Vector, controller: PI, logged: Vector, st
         highest = np.floor(np.log10(size.max()))
         steps *= 10.0 ** (np.floor(np.log10(np.where(size > 0.0, size, size.max()))) - highest)
     at_once, drift = _of_signals(rec, command, controller, step)
-    rounded = float(np.mean(steps**2)) / 12.0 + ROUNDING**2 * float(np.mean(logged**2))
+    rounded = float(np.mean(steps**2)) / 12.0 + SINGLE_PRECISION**2 * float(np.mean(logged**2))
     return float(np.sqrt(rounded + at_once**2 / 12.0 + drift**2))
