@@ -1,8 +1,8 @@
 """Refit a drive of a given structure to a record, with SciPy and the simulated drive of the blind tests.
 
-`oracle`: the true structure, refitted to the record. It works on the replay, where the controller reads the recorded velocity:
-for the true drive the remainder is then exactly the sensor's noise and the filtered disturbance, and an autoregressive filter
-whitens it.
+`oracle`: the true structure, refitted to the record.
+It works on the replay, where the controller reads the recorded velocity: for the true drive the remainder is then exactly
+the sensor's noise and the filtered disturbance, and an autoregressive filter whitens it.
 
 `limit`: the separability limit of an effect, the size at which the nearest rival, refitted together with the mechanics, leaves
 chi2 = 25 in the simulated closed loop (noise-free record, 0.1 rad/s, velocity alone).
@@ -155,8 +155,8 @@ def oracle(truth: Truth, velocity: Array, validation: Array) -> float:
     return float(np.sqrt(np.mean((validation - free) ** 2)))
 
 
-# Who comes near whom: the parent, the rest of the family, and what measured confusion tables say. None of them a generalisation
-# of the truth, and no equivalent effect.
+# Who comes near whom: the parent, the rest of the family, and what measured confusion tables say.
+# None of them a generalisation of the truth, and no equivalent effect.
 NEAR = {
     "coulomb_friction": ("torque_dead_band", "unbalance", "quadratic_drag", "load_torque"),
     "stribeck_friction": ("coulomb_friction", "asymmetric_friction", "friction_drift", "presliding_friction"),

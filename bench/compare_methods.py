@@ -3,9 +3,9 @@
     pip install gaident[compare]
     GAIDENT_DATA=... python bench/compare_methods.py [--only NAME ...] [--json FILE]
 
-Every method gets the training record; black boxes choose their sizes on the last quarter of it. Then it simulates the test record
-from its input alone: no measured output but the first samples that a difference equation needs to begin. Time: fitting and
-choosing, one core.
+Every method gets the training record; black boxes choose their sizes on the last quarter of it.
+Then it simulates the test record from its input alone:
+no measured output but the first samples that a difference equation needs to begin. Time: fitting and choosing, one core.
 """
 
 from __future__ import annotations

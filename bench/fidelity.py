@@ -3,10 +3,11 @@
     python bench/fidelity.py [--drives 100] [--runs 20] [--write docs/dsp.md]
 
 Velocity: largest deviation from double, relative to the response's peak, over 250 samples of a 43.6 rad/s step; the paper's two
-drives (Table IV, loop gains as Table V needs them) and random ones from the paper's search ranges whose loop is stable. Fitness:
-relative deviation of the error sum against a record with 0.3 rad/s of noise. Both in delta form and in powers of z, whose
-coefficients are computed in double and rounded once. Runs: Settings.paper() with the same seeds in every arithmetic. --write puts
-the tables between the marks `<!-- fidelity -->` and `<!-- end of fidelity -->` of a file.
+drives (Table IV, loop gains as Table V needs them) and random ones from the paper's search ranges whose loop is stable.
+Fitness: relative deviation of the error sum against a record with 0.3 rad/s of noise.
+Both in delta form and in powers of z, whose coefficients are computed in double and rounded once.
+Runs: Settings.paper() with the same seeds in every arithmetic.
+--write puts the tables between the marks `<!-- fidelity -->` and `<!-- end of fidelity -->` of a file.
 """
 
 from __future__ import annotations

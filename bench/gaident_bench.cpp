@@ -218,8 +218,8 @@ std::vector<Instructions> instruction_sets() {
     return all;
 }
 
-// Runs of `generations` from a random population, as the paper runs 1000; the time of one generation. A short run holds every
-// structure p, q <= 3, a long one mostly the winner's.
+// Runs of `generations` from a random population, as the paper runs 1000; the time of one generation.
+// A short run holds every structure p, q <= 3, a long one mostly the winner's.
 void generation_row(const Instructions& set, bool in_float, int population, std::size_t samples, LoopKind kind, Task task,
                     int generations) {
     Data data(samples, kind, task);

@@ -12,9 +12,11 @@ Every finished case is a line of the file: stop at will, start again and it goes
 `--write` puts what was measured into the data of docs/theory/policy.md (bench/rows/measured.json); `python docs/tools/policy.py`
 writes the page then.
 
-"Half" and "twice" follow from the row's unit (`moved` in bench/rows/watch.py). Each case runs once with the policy as it is and
-every row watched: that tells for each step of each row whether any decision of the case would be another. Where none would, the
-result is the same, and the case is not run with it; else it is run again (not with --ranges), and the two results are compared.
+"Half" and "twice" follow from the row's unit (`moved` in bench/rows/watch.py).
+Each case runs once with the policy as it is and every row watched:
+that tells for each step of each row whether any decision of the case would be another.
+Where none would, the result is the same, and the case is not run with it;
+else it is run again (not with --ranges), and the two results are compared.
 """
 
 from __future__ import annotations

@@ -4,9 +4,10 @@
     python bench/real.py --out real.jsonl --report          # tables only, from what is there
     python bench/real.py --out new.jsonl --check            # fails where an answer is worse than in real_expected.py
 
-Every finished part of a case is a line of the file: stop at will, start again and it goes on. A case has two parts: the plain
-figures, and the diagnosis of the same training data. The recorded data are in the folder that GAIDENT_DATA names. --only takes
-the cases whose key ("joint 6/decimated 2") contains one of the texts. The published answers are asserted at the end.
+Every finished part of a case is a line of the file: stop at will, start again and it goes on.
+A case has two parts: the plain figures, and the diagnosis of the same training data.
+The recorded data are in the folder that GAIDENT_DATA names.
+--only takes the cases whose key ("joint 6/decimated 2") contains one of the texts. The published answers are asserted at the end.
 With --check (`make real`), cases whose data are not here are left out and named.
 """
 

@@ -2,12 +2,13 @@
 
     python bench/scaling.py [--quick]
 
-Every row runs in a process of its own. Time per generation is the difference between long and short runs of
-`_core.Experiment.search` (engine "plain", continuous loop), so that setting up costs nothing; the median run of each.
+Every row runs in a process of its own.
+Time per generation is the difference between long and short runs of `_core.Experiment.search` (engine "plain",
+continuous loop), so that setting up costs nothing; the median run of each.
 Processor time, so that a busy machine matters little; where threads are compared, the clock on the wall and the shortest runs,
-which want an idle machine: the load is printed. Each row asserts its
-answer: the best fitness is the error sum of that candidate's own simulation. Memory: the process's peak, and what of it the
-interpreter, numpy, gaident and the record took before the search began.
+which want an idle machine: the load is printed.
+Each row asserts its answer: the best fitness is the error sum of that candidate's own simulation.
+Memory: the process's peak, and what of it the interpreter, numpy, gaident and the record took before the search began.
 """
 
 from __future__ import annotations

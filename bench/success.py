@@ -2,8 +2,9 @@
 
     python bench/success.py [--cases 100] [--only NAME ...] [--paper]
 
-"Right" means the true (p, q) *and* rms(fitted response - noise-free truth) below `limit` times the noise. Every case has its own
-noise and its own seed of the genetic search. Records: loop "continuous", dt 0.444 ms, white noise on the simulated output.
+"Right" means the true (p, q) *and* rms(fitted response - noise-free truth) below `limit` times the noise.
+Every case has its own noise and its own seed of the genetic search.
+Records: loop "continuous", dt 0.444 ms, white noise on the simulated output.
 """
 
 from __future__ import annotations

@@ -1,5 +1,5 @@
-// What the guard compares with: instructions per candidate and sample of each row when somebody last looked, per compiler. A text
-// file, one row per line: compiler, instruction set, number type, work, count.
+// What the guard compares with: instructions per candidate and sample of each row when somebody last looked, per compiler.
+// A text file, one row per line: compiler, instruction set, number type, work, count.
 #pragma once
 
 #include <algorithm>

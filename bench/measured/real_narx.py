@@ -21,8 +21,8 @@ MOST_TERMS = 12
 def narx_rmse(training: Sequence[ga.Record], held_out: Sequence[ga.Record]) -> float:
     """The velocity error of its free run on the held-out records [rad/s]; inf where it diverges.
 
-    Channels are divided by their largest value. Training records stand one behind the other: the few rows at the joints are
-    wrong, of thousands.
+    Channels are divided by their largest value.
+    Training records stand one behind the other: the few rows at the joints are wrong, of thousands.
     """
     speed, torque = (float(max(np.abs(getattr(r, name)).max() for r in training)) for name in ("velocity", "torque"))
     y = np.concatenate([r.velocity for r in training]).reshape(-1, 1) / speed

@@ -1,8 +1,8 @@
 """The measured records of bench/real.py: a table of what they are, how they are cut, and what is known about them.
 
-Sources and licences stand in the README of the recorded data (`GAIDENT_DATA`) and in docs/diagnosis.md. A case is a drive, a
-variation of its record, and the truth: groups of effect names of which each has to be found, or None where the record decides
-nothing. What may stand beside them is in `allowed`.
+Sources and licences stand in the README of the recorded data (`GAIDENT_DATA`) and in docs/diagnosis.md.
+A case is a drive, a variation of its record, and the truth: groups of effect names of which each has to be found,
+or None where the record decides nothing. What may stand beside them is in `allowed`.
 """
 
 from __future__ import annotations

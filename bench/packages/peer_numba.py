@@ -1,8 +1,9 @@
 """The same problem compiled by numba: error sums for the peers, and a whole genetic algorithm.
 
 Everything is in delta form (delta = z - 1), as in the core; `fastmath` and the machine's own vector width, which the core
-does without or chooses at run time. The genetic algorithm keeps its 194 bits as 21 integer fields, draws random bits by the
-word and mutations by their gaps, and simulates candidates of one order side by side.
+does without or chooses at run time.
+The genetic algorithm keeps its 194 bits as 21 integer fields, draws random bits by the word and mutations by their gaps,
+and simulates candidates of one order side by side.
 """
 
 from __future__ import annotations
@@ -292,8 +293,8 @@ def contest(state, costs):
 def genetic(seed, population, generations, structure, ranges, logarithmic, loop, command, output, best_fields):
     """The paper's run: tournament of 2, multi-point crossover 0.9, bit mutation 0.01, no elite.
 
-    population: rows of fields, replaced by the last generation. structure: (p, q) to keep, or (-1, -1). Writes the best fields
-    seen and returns their cost.
+    population: rows of fields, replaced by the last generation. structure: (p, q) to keep, or (-1, -1).
+    Writes the best fields seen and returns their cost.
     """
     count = len(population)
     state = np.array([np.uint64(seed) * np.uint64(0x9E3779B97F4A7C15) + np.uint64(1)])

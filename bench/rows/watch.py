@@ -1,13 +1,13 @@
 """Watched numbers: one run of a case shows for every row of the policy how far it can be moved before any decision changes.
 
 A watched policy contains, instead of each number that decides, a `Watched`: the number, and beside it what it would be if its row
-were moved by each of some steps. Arithmetic and NumPy's functions carry all of them along. Where a comparison, a rounding or
-another conversion ends in a plain value, the run goes on with the value of the policy, and every step for which the plain value
-would be another is noted in `Watch.turned`.
+were moved by each of some steps. Arithmetic and NumPy's functions carry all of them along.
+Where a comparison, a rounding or another conversion ends in a plain value, the run goes on with the value of the policy,
+and every step for which the plain value would be another is noted in `Watch.turned`.
 
 So a step that is not in `turned` at the end is proven: with the row there, every decision is the same, and the result with it,
-but for texts and figures that quote the row itself. A step that is in `turned` may still lead to the same result;
-`bench/policy.py` runs the case again to see.
+but for texts and figures that quote the row itself.
+A step that is in `turned` may still lead to the same result; `bench/policy.py` runs the case again to see.
 """
 
 from __future__ import annotations
@@ -34,8 +34,9 @@ Key = tuple[str, float]
 def moved(row: PolicyRow, step: float) -> float | None:
     """The value of a row after some steps, by its unit; None: there is none.
 
-    A number is doubled by a step, a probability taken times ten. Of a share between one half and 1, what is missing to 1 is
-    halved by a step upwards: 0.9 becomes 0.95 or 0.8. What is counted stays a whole number, and at least 1.
+    A number is doubled by a step, a probability taken times ten.
+    Of a share between one half and 1, what is missing to 1 is halved by a step upwards: 0.9 becomes 0.95 or 0.8.
+    What is counted stays a whole number, and at least 1.
 
     >>> found = {r.name: r for r in rows()}
     >>> [moved(found["swap"], s) for s in (-1, 1)], [round(moved(found["stands"], s), 3) for s in (-1, 1)]

@@ -2,8 +2,9 @@
 
     python make_traces.py
 
-The same numbers each time. What is hidden in each: 0.04 N m of dry friction in run1.csv and run2.csv, 0.12 N m in
-velocity_mode.csv and position_mode.csv, 1.5 N m of gravity beside 0.3 N m of dry friction in robot_joint.csv.
+The same numbers each time.
+What is hidden in each: 0.04 N m of dry friction in run1.csv and run2.csv, 0.12 N m in velocity_mode.csv and position_mode.csv,
+1.5 N m of gravity beside 0.3 N m of dry friction in robot_joint.csv.
 """
 
 from __future__ import annotations

@@ -149,8 +149,9 @@ class Record:
     """Input (velocity command [rad/s], torque [N m] in the open loop) and measured velocity [rad/s] of an identification.
 
     start: "rest", "steady" (velocity0 [rad/s] under constant input) or "free" (unknown, estimated from "steady" on).
-    clock: of the controller. In the loop of a servo the record starts at rest, and its command is "held", "straight" or "mixed"
-    between the lines of the log; `straight` is the part of a mixed one that goes straight.
+    clock: of the controller.
+    In the loop of a servo the record starts at rest, and its command is "held",
+    "straight" or "mixed" between the lines of the log; `straight` is the part of a mixed one that goes straight.
     """
 
     def __init__(
@@ -176,8 +177,8 @@ class Experiment:
     """Records and their loop: what candidates are simulated against.
 
     kernels: an instruction set, "" for the machine's best; fused: whether it has an instruction for a b + c.
-    Ctrl-C ends long work, and so does an exception that `progress` raises. It gets
-    (generations done, best fitness, number of species, (p, q) of the one that leads or (-1, -1)).
+    Ctrl-C ends long work, and so does an exception that `progress` raises.
+    It gets (generations done, best fitness, number of species, (p, q) of the one that leads or (-1, -1)).
     """
 
     def __init__(self, records: Sequence[Record], loop: Loop, kernels: str = "") -> None: ...

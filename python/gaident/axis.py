@@ -1,7 +1,8 @@
 """A rotary and a linear axis: what each calls the same thing, and sentences that are written for both at once.
 
-Inside, a linear axis has m, m/s and N in the places of rad, rad/s and N m. What it is called is decided where a sentence is
-made: the words and units that differ stand in braces, and both sentences are made from the same numbers.
+Inside, a linear axis has m, m/s and N in the places of rad, rad/s and N m.
+What it is called is decided where a sentence is made: the words and units that differ stand in braces,
+and both sentences are made from the same numbers.
 
     >>> limit = say("a limit above {:.3g} {N m} would not have shown: no more {torque} was asked for", 1.25)
     >>> print(limit)
@@ -112,8 +113,8 @@ class Text(str):
 def say(template: str, *values: object, **named: object) -> Text:
     """The sentence of both axes: the fields of `template` are values as in str.format, and words and units in braces.
 
-    values, named: numbers, words, or a `Text`, which keeps its two sentences. Raises KeyError for a word in braces that stands
-    neither in `WORDS` nor in `UNITS`.
+    values, named: numbers, words, or a `Text`, which keeps its two sentences.
+    Raises KeyError for a word in braces that stands neither in `WORDS` nor in `UNITS`.
     """
     return Text(
         template.format(*values, **(_ROTARY | named)),

@@ -1,7 +1,7 @@
 """Exceptions of gaident.
 
-Wrong use raises one of these; all are subclasses of ValueError. Every message names the argument (or the
-file and the line), the offending value and the remedy.
+Wrong use raises one of these; all are subclasses of ValueError.
+Every message names the argument (or the file and the line), the offending value and the remedy.
 """
 
 from __future__ import annotations

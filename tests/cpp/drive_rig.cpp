@@ -350,8 +350,8 @@ using rig_controller::clamp;
 }  // namespace
 
 // One run of n samples of the controller. `command` drives the loop; where it is null, `given` is the torque command of an open
-// loop. `measured`, where given, is what the controller reads instead of the velocity (a replay). Returns 0, or 1 where the drive
-// ran away. load: whose effects of the shaft act at the load.
+// loop. `measured`, where given, is what the controller reads instead of the velocity (a replay).
+// Returns 0, or 1 where the drive ran away. load: whose effects of the shaft act at the load.
 extern "C" int drive_rig_run(const Drive* drive, const Drive* load, const rig_controller::Settings* settings,
                              const double* filters, int filter_count, int n, double dt, int substeps, const double* command,
                              const double* given, const double* measured, const double* velocity_noise,
@@ -374,8 +374,8 @@ extern "C" int drive_rig_run(const Drive* drive, const Drive* load, const rig_co
         if (velocity_noise) w += velocity_noise[i];
         if (d.quantum > 0) w = std::round(w / d.quantum) * d.quantum;
         if (d.encoder > 0) {
-            // Differences of a position lattice. The sum of the samples follows w without the half sample that the
-            // difference of the angle itself costs.
+            // Differences of a position lattice.
+            // The sum of the samples follows w without the half sample that the difference of the angle itself costs.
             encoded += dt * w;
             const double line = std::floor((d.differenced != 0 ? rig.s[angle] : encoded) / d.encoder + 0.5);
             w = (line - last_line) * d.encoder / dt;

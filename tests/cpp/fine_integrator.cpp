@@ -2,8 +2,8 @@
 //
 // Explicit steps of a hundredth of a sample or less, the twist half before and half after the velocity (leapfrog), friction by
 // clipping the velocity that the other torques would bring (Moreau), delay by a buffer of fine steps, filters by the midpoint
-// rule, the bristle by Heun, an analog controller's torque extrapolated by half a step. The equations are those of the public
-// table of effects.
+// rule, the bristle by Heun, an analog controller's torque extrapolated by half a step.
+// The equations are those of the public table of effects.
 //
 // Compiled and called by tests/python/support/fine_integrator.py, which reads the list of fields below.
 #include <algorithm>

@@ -1,4 +1,4 @@
-// What of a controller's replay on a measured velocity only one sample after the other gives. In place.
+// The parts of a controller's replay on a measured velocity that need a loop over samples; they work in place.
 #pragma once
 
 #include "controller.hpp"
@@ -26,10 +26,11 @@ enum class Hold { held, held_back, tracked };
 
 // e(n) -> u(n) of a PI with the torque limit U: I' = clamp(I(n-1) + newest e(n) + before e(n-1), +-clamp), v = kp e(n) + I',
 // u(n) = clamp(v, +-U); I(n) = I', but where |v| > U as the rule says: I(n-1), I(n-1) where e(n) v > 0, u(n) - kp e(n)
-// This is no second copy of Servo (servo.hpp), with which a loop is simulated. Only the integral is the same: newest and before are
-// ki T times the shares that Servo gives the two errors. The rules are those that a log is searched for: held has no counterpart in
-// Servo; held_back issues the limit itself, where Servo forms u again with the integral that was held, which may stay below the
-// limit; tracked is Servo's tracking at Tt = T only.
+// This is no second copy of Servo (servo.hpp), with which a loop is simulated.
+// Only the integral is the same: newest and before are ki T times the shares that Servo gives the two errors.
+// The rules are those that a log is searched for: held has no counterpart in Servo;
+// held_back issues the limit itself, where Servo forms u again with the integral that was held, which may stay below the limit;
+// tracked is Servo's tracking at Tt = T only.
 inline void held_torque(std::span<double> error, const Controller& c, double newest, double before, Hold rule, double integral) {
     double last = 0.0;
     for (double& x : error) {

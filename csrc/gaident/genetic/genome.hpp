@@ -2,8 +2,9 @@
 //
 //     p | q | K | A11 A12 A13 | A21 B21 | A22 B22 | A23 B23        each A and B: real part, imaginary part
 //
-// 2 + 2 + 10 + 9 * (10 + 10) = 194 bits. More bits, p or q up to 7, other ranges or another code are another table and no new
-// code. A field of `width` bits with integer code c in 0..2^width - 1 stands for
+// 2 + 2 + 10 + 9 * (10 + 10) = 194 bits.
+// More bits, p or q up to 7, other ranges or another code are another table and no new code.
+// A field of `width` bits with integer code c in 0..2^width - 1 stands for
 //
 //     linear       value = lo + (hi - lo) * c / (2^width - 1)
 //     logarithmic  value = lo * (hi / lo)^(c / (2^width - 1))

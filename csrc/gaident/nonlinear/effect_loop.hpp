@@ -1,12 +1,14 @@
 // The closed loop with effects at their places, written once for one candidate (R = double) and for lanes of candidates that have the same
-// effects with different parameters; every lane equals the scalar bit for bit. Which effects there are is the same for all lanes and may
-// be asked with a branch; on numbers there are selections only. The loop names no effect: it runs over the list (effects/list.hpp) at each
-// hook (effects/effect.hpp). The chain, with a user's own effects (own_effects.hpp) at those marked with a star:
+// effects with different parameters; every lane equals the scalar bit for bit.
+// Which effects there are is the same for all lanes and may be asked with a branch; on numbers there are selections only.
+// The loop names no effect: it runs over the list (effects/list.hpp) at each hook (effects/effect.hpp).
+// The chain, with a user's own effects (own_effects.hpp) at those marked with a star:
 //
 //     command -> controller -> *actuator -> actuator_dynamics -> *torque -> coupling, *friction -> *sensor -> sensor_dynamics -> reading
 //
-// One sample is `substeps` steps of h. In the sampled and the open loop the torque is held over the sample; in the continuous one the
-// controller acts every substep on the linearly interpolated command, and its torque is extrapolated to the substep's mean (third order).
+// One sample is `substeps` steps of h.
+// In the sampled and the open loop the torque is held over the sample; in the continuous one the controller acts every substep
+// on the linearly interpolated command, and its torque is extrapolated to the substep's mean (third order).
 #pragma once
 
 #include "../control/servo.hpp"
@@ -56,7 +58,7 @@ public:
         theta_middle_ = fma(plant_.velocity(), R(0.5 * h_), angle_);
         if (looking_back_)
             for (std::size_t i = 0; i <= run.history_mask; ++i) Pack<R>::store(c_.before, run.history + i * width);
-        // Friction that drives the shaft is none: such a candidate counts as diverged.
+        // Friction cannot drive the shaft: a candidate with such a friction counts as diverged.
         if (dry_) plant_.x[0] = greater(plant_.beta(), R(0.0), plant_.x[0], R(any_value));
         per_beta_ = R(1.0) / plant_.beta();
     }

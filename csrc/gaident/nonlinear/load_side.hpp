@@ -33,8 +33,9 @@ struct FreeEnd {
 //
 //     w_L+ = w_free,L - (back/beta_M) w_free,M - (beta_L - back across/beta_M) f_L
 //
-// With it slipping f_M is that of the sliding motor. So the load's equation holds with its own f_L alone in every case, and
-// velocity_under_friction() chooses between its sticking and slipping; the motor's case is the one found with the f_L before.
+// With it slipping f_M is that of the sliding motor.
+// So the load's equation holds with its own f_L alone in every case, and velocity_under_friction() chooses between its
+// sticking and slipping; the motor's case is the one found with the f_L before.
 // Two rounds: with k = across back/(beta_M beta_L), which is at most about (omega h)^4/144, omega the resonance, a round leaves k
 // of the change of f_L where the ends do not stick, and nothing where both do.
 // `motor` and `load` are end(round, w_free, beta): w+ of this end under its friction.

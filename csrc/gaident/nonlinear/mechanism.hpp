@@ -150,8 +150,9 @@ template <class R>
 struct LoadedTwoMassPlant : TwoMassPlant<R> {
     static constexpr bool both_ends = true;
     using TwoMassPlant<R>::x, TwoMassPlant<R>::motor, TwoMassPlant<R>::coupling, TwoMassPlant<R>::correction;
-    // Response to a unit torque at the load. The coupling's pulls the motor back by what it drives the load with, so that with a
-    // unit torque at the motor beside it only the load is driven.
+    // Response to a unit torque at the load.
+    // The coupling's pulls the motor back by what it drives the load with,
+    // so that with a unit torque at the motor beside it only the load is driven.
     R load[3];
     R free[3];                // w_M, w_L, psi at the substep's end without friction
     bool correcting = false;   // whether the coupling is not linear,

@@ -1,5 +1,6 @@
-// A double whose products and sums are two operations. For what a processor without a fused one computes once, before a run, and must
-// find the same as the host (target/fixed_scaling.hpp): it needs no library.
+// A double whose products and sums are two operations.
+// For what a processor without a fused one computes once, before a run,
+// and must find the same as the host (target/fixed_scaling.hpp): it needs no library.
 #pragma once
 
 #include "arithmetic.hpp"

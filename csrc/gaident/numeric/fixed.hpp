@@ -2,9 +2,10 @@
 //
 // A word w with binary point f stands for w 2^-f. There are two kinds:
 //
-// FixedNumber   a parameter, coefficient or cost. Its point follows its value, so that 30 bits stand behind the sign: K, the roots
-//               and the polynomial's coefficients lie many decades apart. Each operation rounds to nearest, halves up;
-//               a quotient is cut towards zero first, within one unit of its last bit.
+// FixedNumber   a parameter, coefficient or cost. Its point follows its value, so that 30 bits stand behind the sign.
+//               K, the roots and the polynomial's coefficients lie many decades apart.
+//               Each operation rounds to nearest, halves up.
+//               A quotient is cut towards zero first, within one unit of its last bit.
 // FixedSignal   a velocity or a state of the recurrence. Its point is chosen before the run (fixed_scaling.hpp) and stays.
 //
 // In a recurrence signals are summed in 64 bits with 16 more bits behind the point, products moved to that point rounded to

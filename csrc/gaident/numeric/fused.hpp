@@ -29,9 +29,10 @@ namespace gaident {
 namespace detail {
 
 #if defined(__SSE2__) && !defined(__FMA__)
-// The C library's function without the instruction splits its operands and adds up what is lost. Where denormals are flushed
-// (FlushDenormals) some of these parts are, and from 1e-291 down its results are wrong; the instruction flushes operands and result and
-// nothing in between. So the parts are computed with denormals, and operands and result are flushed here.
+// The C library's function without the instruction splits its operands and adds up what is lost.
+// Where denormals are flushed (FlushDenormals) some of these parts are, and from 1e-291 down its results are wrong;
+// the instruction flushes operands and result and nothing in between.
+// So the parts are computed with denormals, and operands and result are flushed here.
 // (The function for floats computes in double, whose parts are no denormals.)
 [[gnu::noinline]] inline double fma_between_flushes(double a, double b, double c) {
     constexpr double least = std::numeric_limits<double>::min();
@@ -50,8 +51,9 @@ namespace detail {
     flush(a), flush(b), flush(c);
     FlushDenormals::set_control(before & ~FlushDenormals::flush);
     double r = call(a, b, c);
-    // The instruction flushes what is below the least normal number after rounding to 53 bits. A denormal has fewer, and may have been
-    // rounded up to that number: seen at twice the size. Then the lesser factor is far from the largest number.
+    // The instruction flushes what is below the least normal number after rounding to 53 bits.
+    // A denormal has fewer, and may have been rounded up to that number: seen at twice the size.
+    // Then the lesser factor is far from the largest number.
     if (flushed && __builtin_fabs(r) == least) {
         const bool first = __builtin_fabs(a) < __builtin_fabs(b);
         if (__builtin_fabs(call(first ? 2.0 * a : a, first ? b : 2.0 * b, 2.0 * c)) < 2.0 * least) r = __builtin_copysign(0.0, r);

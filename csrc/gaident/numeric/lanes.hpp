@@ -3,8 +3,9 @@
 // Each lane computes what a scalar would (products and sums are fused where the source says so and nowhere else), so results are equal
 // bit for bit whatever the width.
 //
-// `Isa` is a tag with the register width in bytes. Kernels are compiled once per instruction set; the tag keeps their template
-// instantiations apart, so that the linker never takes AVX-512 code for a machine that has none.
+// `Isa` is a tag with the register width in bytes.
+// Kernels are compiled once per instruction set; the tag keeps their template instantiations apart,
+// so that the linker never takes AVX-512 code for a machine that has none.
 #pragma once
 
 #include "arithmetic.hpp"

@@ -2,10 +2,10 @@
 //
 //   word(k) = mix(key + (k + 1) * 0x9E3779B97F4A7C15),   k = 0, 1, 2, ...
 //
-// with `mix` the output function of SplitMix64 (Steele, Lea, Flood 2014). Counter form: any word of the sequence
-// is reached without the ones before it, so a block of words has no serial dependence. Every number the genetic
-// operators use is derived from these words by the integer rules below, none by a std:: distribution, so that a seed means
-// the same run on every machine and for every compiler.
+// with `mix` the output function of SplitMix64 (Steele, Lea, Flood 2014).
+// Counter form: any word of the sequence is reached without the ones before it, so a block of words has no serial dependence.
+// Every number the genetic operators use is derived from these words by the integer rules below, none by a std::
+// distribution, so that a seed means the same run on every machine and for every compiler.
 #pragma once
 
 #include <cstddef>

@@ -1,6 +1,7 @@
-// work(0), work(1), ..., work(n - 1). Where `known`, which is n or -1, is known at compile time the calls are written out, so that every
-// index is a constant from the start and an array of registers stays in registers: a loop that the compiler unrolls later leaves it in
-// memory, where each sum waits for the store of the sample before.
+// work(0), work(1), ..., work(n - 1).
+// Where `known`, which is n or -1, is known at compile time the calls are written out,
+// so that every index is a constant from the start and an array of registers stays in registers:
+// a loop that the compiler unrolls later leaves it in memory, where each sum waits for the store of the sample before.
 #pragma once
 
 #include <type_traits>

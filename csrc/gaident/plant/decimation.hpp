@@ -12,9 +12,9 @@
 //
 //     D' = D D~,   2 z N' = N D~ (2 + delta) + N~ D delta   or   N D~ (2 + delta)^2/2 - N~ D delta^2/2
 //
-// From the lowest power on: e = r delta + ..., so that the coefficient of e^k is what the lower ones leave of that of delta^k. For
-// poles inside the unit circle both sides of the first line have positive coefficients, and those that are small, of poles near
-// z = 1, are made of small numbers alone. In powers of z they would be lost.
+// From the lowest power on: e = r delta + ..., so that the coefficient of e^k is what the lower ones leave of that of delta^k.
+// For poles inside the unit circle both sides of the first line have positive coefficients, and those that are small,
+// of poles near z = 1, are made of small numbers alone. In powers of z they would be lost.
 #pragma once
 
 #include "delta.hpp"

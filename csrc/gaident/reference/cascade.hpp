@@ -2,9 +2,8 @@
 //
 //     u -> G0 = K -> G11 -> G12 ... -> G21 -> G22 ... -> w
 //
-// every module a difference equation of its own in powers of z, with its own past. Conjugate pairs make one module of
-// order two. Slow and obvious; it shares no line with the fast path. Run in long double or wider where its own
-// rounding matters.
+// every module a difference equation of its own in powers of z, with its own past. Conjugate pairs make one module of order two.
+// Slow and obvious; it shares no line with the fast path. Run in long double or wider where its own rounding matters.
 #pragma once
 
 #include "../control/controller.hpp"
@@ -128,8 +127,8 @@ struct Regulator {
         e = error;
     }
 
-    // The torque u with u = torque(r - H - G u): each limit is either not reached, or reached above or below. The
-    // right one of the nine cases is the one that the controller itself agrees with.
+    // The torque u with u = torque(r - H - G u): each limit is either not reached, or reached above or below.
+    // The right one of the nine cases is the one that the controller itself agrees with.
     R solve(R r, R G, R H) const {
         const R half = R(ki) * R(sample_time) / R(2), free = r - H;
         const R u_free = ((R(kp) + half) * free + I + half * e) / (R(1) + G * (R(kp) + half));

@@ -85,7 +85,7 @@ private:
     static constexpr double out_of_reach = 2.0;
     // A species whose cost is within so many times the least is about as good as any.
     static constexpr double close_to_best = 1.2;
-    // What a better optimum leaves of the cost, at most: less is the end of a valley, and no reason for another round.
+    // Largest share of the cost that a better optimum leaves: a smaller fall ends the local search, without another round.
     static constexpr double worth_a_round = 0.95;
 
     // An island for these species.

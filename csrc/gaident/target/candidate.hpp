@@ -1,5 +1,5 @@
-// One candidate against one record in any arithmetic: genes -> coefficients -> recurrence -> fitness. What runs in a drive
-// (static_search.hpp) and on the host where a search mirrors it (mirror.hpp). Continuous loop, no limits.
+// One candidate against one record in any arithmetic: genes -> coefficients -> recurrence -> fitness.
+// What runs in a drive (static_search.hpp) and on the host where a search mirrors it (mirror.hpp). Continuous loop, no limits.
 //
 // An arithmetic A names its types:
 //

@@ -147,8 +147,8 @@ class Controller(ABC):
     def line_equation(self, log: LoopSignals, poles: int) -> bool:
         """Whether one difference equation takes a log that starts at rest from line to line, although it samples faster.
 
-        poles: of the plant beside it. Its commands are logged, and controller and plant together are linear and of an order that
-        the core contains.
+        poles: of the plant beside it.
+        Its commands are logged, and controller and plant together are linear and of an order that the core contains.
         """
         return False
 

@@ -38,8 +38,9 @@ def zero_phase(sections: Matrix, rows: Matrix, extension: int) -> Matrix:
     """Rows behind a low-pass, forward and backward: no phase, and the square of its gain.
 
     sections: (k, 6), b and a of second order, with a gain of 1 at rest; rows: (n, samples), continued by their point reflections
-    at both ends for `extension` samples, fewer than they have. As `scipy.signal.sosfiltfilt`, but all rows side by side: a fit
-    asks for it at every step. The filter begins and ends at rest at the first and the last value, which pass it unchanged.
+    at both ends for `extension` samples, fewer than they have.
+    As `scipy.signal.sosfiltfilt`, but all rows side by side: a fit asks for it at every step.
+    The filter begins and ends at rest at the first and the last value, which pass it unchanged.
     """
     before, after = rows[:, extension:0:-1], rows[:, -2 : -extension - 2 : -1]
     x = np.hstack([2.0 * rows[:, :1] - before, rows, 2.0 * rows[:, -1:] - after])

@@ -13,13 +13,13 @@ from gaident.control.controller import Controller
 from gaident.errors import ControllerError
 from gaident.policy.table import POLICY
 
-__all__ = ["STEP", "FoundNumbers", "loosened"]
+__all__ = ["NUMBER_STEP", "FoundNumbers", "loosened"]
 
 Vector = NDArray[np.float64]
 Matrix = NDArray[np.float64]
 
-STEP = 1e-3  # no decision: of a number of the controller, for a difference
-RANK = 1e-9  # no decision: of the largest variance, what a sum is exact to
+NUMBER_STEP = 1e-3  # no decision: of a number of the controller, for a difference
+VARIANCE_RANK = 1e-9  # no decision: of the largest variance, what a sum is exact to
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,14 +45,14 @@ class FoundNumbers:
         """(m, k): one deviation in each independent direction; without a covariance a small step of each number."""
         size = len(self.at)
         if self.covariance is None:
-            return STEP * np.eye(size)
+            return NUMBER_STEP * np.eye(size)
         std = np.sqrt(np.maximum(np.diag(self.covariance), 0.0))
         known = np.flatnonzero((std > 0.0) & np.isfinite(std))
         if not len(known):
             return np.zeros((0, size))
         std = std[known]
         values, vectors = np.linalg.eigh(self.covariance[np.ix_(known, known)] / np.outer(std, std))
-        kept = values > RANK
+        kept = values > VARIANCE_RANK
         rows = np.zeros((int(np.sum(kept)), size))
         rows[:, known] = (vectors[:, kept] * np.sqrt(values[kept])).T * std
         return rows

@@ -1,8 +1,9 @@
 """A position command between the lines of its log, as a controller makes it that computes the profile at its own clock.
 
-Between two lines it is the cubic through four of them. Where the acceleration jumps, as at the corners of a trapezoidal velocity,
-no polynomial goes through the lines on both sides. There the parabola L of the three lines before goes over into the parabola R
-of the three lines after, at the time at which both have the same position and the same slope:
+Between two lines it is the cubic through four of them.
+Where the acceleration jumps, as at the corners of a trapezoidal velocity, no polynomial goes through the lines on both sides.
+There the parabola L of the three lines before goes over into the parabola R of the three lines after,
+at the time at which both have the same position and the same slope:
 
     R(t) - L(t) = a (t - t*)^2 + c,   c = 0
 

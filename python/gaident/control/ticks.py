@@ -115,8 +115,8 @@ def _ramps(line: Vector) -> Vector:
 def straight_part(line: Vector, is_position: bool) -> tuple[str, Vector]:
     """How a command goes from line to line, and the part of it that goes straight where it is mixed; shape (n,) or (0,).
 
-    "held": it changes at the lines only; "straight"; "mixed": the sum of two such commands. A part that goes straight is 0 at
-    the first line, so that nothing of it lies before the record.
+    "held": it changes at the lines only; "straight"; "mixed": the sum of two such commands.
+    A part that goes straight is 0 at the first line, so that nothing of it lies before the record.
     """
     steps = np.diff(line) if is_position else _ramps(line)
     if not np.any(steps):

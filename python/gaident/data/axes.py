@@ -28,8 +28,9 @@ def read_axes(path: str | os.PathLike[str] | Any, axes: Mapping[str, Mapping[str
         As in `read`; the log is opened once.
     axes : mapping of str to mapping
         Name of the axis -> channel -> column, as `columns` of `read` takes them, for example
-        ``{"x": {"velocity": "axis1.w", "torque": "axis1.u"}, "y": {...}}``. Beside the channels stand arguments of `read` that
-        hold for this axis alone: ``"units"``, ``"counts_per_turn"``, ``"gear_ratio"``, ...
+        ``{"x": {"velocity": "axis1.w", "torque": "axis1.u"}, "y": {...}}``.
+        Beside the channels stand arguments of `read` that hold for this axis alone:
+        ``"units"``, ``"counts_per_turn"``, ``"gear_ratio"``, ...
     **common : Any
         Arguments of `read` that hold for all: ``columns`` (``{"time": "t"}``), ``units``, ``dt``, ``decimate``, ...
         An axis's own come before them, those of mappings channel by channel.

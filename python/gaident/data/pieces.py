@@ -69,8 +69,9 @@ def read_pieces(
     Returns
     -------
     list of Record
-        In the order of the log. Pieces of fewer than 20 samples, resampled and decimated as asked, are left out, and the first
-        record's notes say how many.
+        In the order of the log.
+        Pieces of fewer than 20 samples, resampled and decimated as asked, are left out,
+        and the first record's notes say how many.
 
     Raises
     ------

@@ -108,8 +108,9 @@ def read(
     Parameters
     ----------
     path : str, path-like or pandas.DataFrame
-        The log. MAT 7.3 and HDF5 need h5py, Parquet pyarrow, TDMS nptdms, MDF asammdf: the extras hdf5, parquet, tdms and mdf
-        of this package.
+        The log.
+        MAT 7.3 and HDF5 need h5py, Parquet pyarrow, TDMS nptdms, MDF asammdf:
+        the extras hdf5, parquet, tdms and mdf of this package.
     columns : mapping of str to str, int or None, optional
         Channel -> column of the file; channels are command, velocity, torque, position and time, and voltage and current, from
         which a torque is worked out.
@@ -138,8 +139,9 @@ def read(
         Of the motor's winding [Ohm], [H], [V s/rad]: a voltage becomes the torque kt (U - ke w)/R, see `Winding`; None: L = 0,
         ke = kt. Of voltage and current without a `torque_constant` the winding is estimated, and a note says so.
     velocity_cutoff_hz : float, optional
-        Corner [Hz]. The velocity of a log that has a position and none is the difference of the position; with a corner all
-        channels pass the same zero-phase low-pass first. Filtered alike, they keep the inertia.
+        Corner [Hz].
+        The velocity of a log that has a position and none is the difference of the position;
+        with a corner all channels pass the same zero-phase low-pass first. Filtered alike, they keep the inertia.
         None, no filter, suits identification.
     decimate : int
         10: every tenth sample behind a low-pass of linear phase whose delay is compensated, see `Record.decimate`.

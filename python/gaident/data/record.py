@@ -281,8 +281,8 @@ class Record:
 
             x_new(n) = x(n - k),   k > 0: later, k < 0: earlier
 
-        `samples` are channel=k; ``rec.shifted(torque=-1)`` is for a torque that the log wrote one sample late. The record is cut
-        to what all channels cover then.
+        `samples` are channel=k; ``rec.shifted(torque=-1)`` is for a torque that the log wrote one sample late.
+        The record is cut to what all channels cover then.
 
         Raises
         ------

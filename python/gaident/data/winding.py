@@ -32,8 +32,8 @@ class Winding:
     inductance : float
         L [H], from 0 on. 0: the current follows at once.
     back_emf_constant : float, optional
-        ke [V s/rad], above 0; None: as the torque constant, which holds for a DC motor in SI units. With the peak values of
-        a three-phase motor in dq coordinates kt = 1.5 ke.
+        ke [V s/rad], above 0; None: as the torque constant, which holds for a DC motor in SI units.
+        With the peak values of a three-phase motor in dq coordinates kt = 1.5 ke.
 
     Raises
     ------

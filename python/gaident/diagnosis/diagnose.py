@@ -148,7 +148,7 @@ def diagnose(
             work.search()
             return work
 
-        def settled(most: int, idn: Identification | None) -> Work:
+        def under_best_controller(most: int, idn: Identification | None) -> Work:
             """The work with at most so many effects, under the controller with which it explains the records."""
             work = searched(driving, most, idn)
             if (form := work.other_form()) is not None:
@@ -168,13 +168,13 @@ def diagnose(
             if work is not given_work and (stands := work.under_given()) is not None:
                 # What was found under other gains explains the records under the given ones as well.
                 work = given_work
-                work.settle(stands)
+                work.accept(stands)
             work.with_joint_numbers()
             return work
 
         linear = identification
         for most in range(1 if quick else POLICY.most_effects, POLICY.most_effects + 1):
-            work = settled(most, linear)
+            work = under_best_controller(most, linear)
             found = work.report(seed)
             if found.causes or found.driver is None:
                 break

@@ -1,8 +1,8 @@
 """Before and after: the free-run simulation, linear and extended, on data that no parameter was fitted to.
 
-With validation records these are used whole. Without, parameters are fitted again to the first 70 % of each record and scored
-on the rest of one continuous run, which is not restarted; where a record is too short for that, the figures are in-sample and say
-so.
+With validation records these are used whole.
+Without, parameters are fitted again to the first 70 % of each record and scored on the rest of one continuous run,
+which is not restarted; where a record is too short for that, the figures are in-sample and say so.
 """
 
 from __future__ import annotations
@@ -166,8 +166,9 @@ def closed_over(controller: Controller | None, records: Sequence[Record], effect
     """What the free runs of these records are closed over, with these effects; None: their torque drives them.
 
     How a loop moved before a record is known of a bare PI only; any other is simulated from rest.
-    Where the log has a line for each sample of another controller, the torque drives: what that controller answered to noise is
-    in it, and would be missing from a loop. But impacts lead a model astray that its torque alone drives.
+    Where the log has a line for each sample of another controller, the torque drives the model.
+    What that controller answered to noise is in the torque, and would be missing from a loop.
+    At impacts the errors of such a model grow, so that a model with impacts is simulated in the loop.
     """
     if controller is None or controller.one_equation:
         return controller
@@ -178,8 +179,8 @@ def closed_over(controller: Controller | None, records: Sequence[Record], effect
 def _turned(rec: Record, controller: Controller | None, final: Fit) -> Record:
     """The record with the angle that the model's effects turned with when it was selected.
 
-    Where none is logged that is the measured velocity, integrated, or the simulation's own. A pendulum that is simulated with its
-    own angle falls to another side sooner or later, whatever is wrong with it.
+    Where none is logged that is the measured velocity, integrated, or the simulation's own.
+    A pendulum that is simulated with its own angle falls to the other side some time, however small the error of the model.
     """
     if final.predictor.own_angle or rec.position is not None or not any(t.turns_with_the_shaft for t in final.parameters.terms):
         return rec
@@ -251,8 +252,9 @@ def free_run_errors(
 def start_state(model: Model, rec: Record, controller: Controller | None, read: Controller | None = None) -> Vector | None:
     """Initial state of the model at the record's start; None where it starts from rest, or moves and the loop has limits.
 
-    At rest the integral may be a load's torque, which the logged torque shows. In motion a model with effects is not linear
-    in its state: two steps of Gauss and Newton over the record's head, from the first velocity.
+    At rest the integral may be a load's torque, which the logged torque shows.
+    In motion a model with effects is not linear in its state: two steps of Gauss and Newton over the record's head,
+    from the first velocity.
     """
     loop = read or controller
     if controller is not None and loop is not None and (stored := stored_torque(rec, loop)):

@@ -1,13 +1,14 @@
 """How far a diagnosis has come, and so how long it will take.
 
 Its parts take very different times: a controller that does not fit the torque is looked for in many forms, then a mechanism is
-identified, and effects are searched for; under another controller once more. Before the first part nobody knows. With t, what
-went before a search took, and d, what this search will take,
+identified, and effects are searched for. All this is done again under another controller.
+Before the identification the time cannot be predicted.
+With t the time before a search and d the time that this search will take,
 
     fraction = t/(t + d) + d/(t + d) (part of the search that is done)
 
-where d is five times what the identification took, or the time of the search before. (done) (1 - fraction)/fraction is then the
-time that is left.
+where d is five times the time of the identification, or the time of the search before.
+The time that is left is then (time so far) (1 - fraction)/fraction.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""One diagnosis on its way: records, search, and what is reported of them."""
+"""One diagnosis while it runs: records, search, and what is reported of them."""
 
 from __future__ import annotations
 
@@ -104,7 +104,7 @@ class Work:
         self.controller_steps, self.at_controller, notes = controller_findings(data, self.scales)
         self.notes += notes
         self.controller_steps += (*self.driving.logged.findings, *self.driving.findings)
-        # Limits that the log shows act in every loop that is closed for a fit.
+        # Limits that the log shows are part of every loop that is simulated in a fit.
         limits = self.at_controller.effects
         known: dict[Term, NDArray[np.float64]] = {
             t: np.array(list(limits[t.name].values())) for t in in_controller() if t.name in limits
@@ -141,8 +141,8 @@ class Work:
             self.take(compared(found, simpler, self._equivalent_here, self._say))
         self._doubt_controller()
 
-    def settle(self, found: Selection) -> None:
-        """The result of the search, and whether another controller would explain the records better."""
+    def accept(self, found: Selection) -> None:
+        """Take this as the result of the search, and look whether another controller would explain the records better."""
         self.take(found)
         self._doubt_controller()
 
@@ -169,7 +169,7 @@ class Work:
         self.notes.append(closer_numbers(old, numbers))
 
     def other_form(self) -> UnloggedForm | None:
-        """A form of controller with which these records are explained better, also than with other gains; no torque shows it."""
+        """A form of controller that explains these records better than the given one and than other gains; None without one."""
         gains, margin = self.gain_doubt.better, self.found.space.margin
         if self.form is None or not self.form.better(margin):
             return None
@@ -182,14 +182,14 @@ class Work:
         return not leaves_noise(given.found.space, given.final) or len(self.final.effects) < len(given.final.effects)
 
     def refused(self, form: UnloggedForm) -> None:
-        """Another form comes closer, but a search under it does not end in noise: what is known is said."""
+        """Note that another form comes closer, although a search under it does not end in noise."""
         self.form, self.form_refused = None, True
         self.notes.append(or_other_form(form.words))
 
     def other_gains(self, first: Work | None = None) -> OtherGains | None:
-        """Gains with which these records are explained better, where no torque shows which they are.
+        """Gains that explain these records better than the given ones, which no logged torque shows; None without such gains.
 
-        first: the work under the given gains, where this one is under others already: its model is the one that is worse.
+        first: the work under the given gains, where this work is under other gains already; the gain is counted from its model.
         """
         better = self.gain_doubt.better
         if better is None or first is None or first is self:
@@ -200,7 +200,7 @@ class Work:
         return replace(better, gain=worse)
 
     def under_given(self) -> Selection | None:
-        """What was found under other gains, under the given ones, where it explains the records as well there; else None."""
+        """The model found under other gains, fitted under the given ones; None where it explains the records worse there."""
         given = self.driving.regained_from
         assert given is not None
         moved = under_given(self.found, given, self.driving.regained_by)
@@ -213,15 +213,15 @@ class Work:
         """The result of a search, and what it leaves."""
         self.found, self.base, self.rivals = found, found.base, found.rivals
         self.data, self.objective = found.space.data, found.space.objective
-        self._settle(found.final)
+        self._set_final(found.final)
 
-    def _settle(self, final: Fit) -> None:
+    def _set_final(self, final: Fit) -> None:
         self.final = final
         self.adequate, self.left = what_is_left(self.found.space, final)
         self.under, self.estimate = self.found.estimated()
 
     def judged(self) -> Judged:
-        """What is shown, and what it gains; where no effect is, that of a search by whitened errors instead."""
+        """The effects that stand, and their gains. Where none stands, those of the search by whitened errors are judged."""
         while True:
             said = list(self.notes)
             self.notes += basis_of(self.found)
@@ -252,7 +252,7 @@ class Work:
             self.take(instead)
 
     def _spoiled(self) -> int:
-        """Samples that stand in the log alone, or that the model that was found does not follow either."""
+        """Number of outliers of the log, and of samples that the model found does not follow."""
         of_log = np.concatenate([np.isin(np.arange(len(r)), self.driving.outliers_in(r)) for r in self.records])
         measured = np.concatenate([r.velocity for r in self.records])
         error = self.objective.error(self.final) + measured - self.data.velocity
@@ -363,7 +363,7 @@ class Work:
     def _alternatives(
         self, effect: str, rivals: Sequence[Replacement], offset: Offset | None, never: Collection[str]
     ) -> tuple[str, ...]:
-        """Rivals, equivalent effects and, where the loop is not the drive's, the controller; no untestable ones."""
+        """Rivals, equivalent effects and, where the loop is not that of the drive, the controller; without untestable ones."""
         shown = shown_by_the_records(self.found.space, self.final, effect)
         here = sorted(self._equivalent_here(effect))
         follows = not (self.data.slower and self.driving.in_doubt)
@@ -375,7 +375,7 @@ class Work:
 
     @property
     def _told_by_the_current(self) -> frozenset[str]:
-        """What is no lag of the torque, where a measured torque shows that lag: what makes the velocity late."""
+        """Effects that delay the velocity, where a measured torque shows the lag of the torque; else none."""
         return frozenset(t.name for t in LIBRARY.values() if t.late) if self.driving.lag is not None else frozenset()
 
     def _only_describes(self, effect: str, driver: str | None) -> bool:
@@ -392,7 +392,7 @@ class Work:
         return set().union(*(c for c in classes if effect in c)) - {effect} - set(self.not_testable)
 
     def _determined(self, effect: str, parameters: Mapping[str, Estimate]) -> bool:
-        """Whether the records say how large an effect is; else its name would rest on nothing, and a note says so."""
+        """Whether the records determine a parameter of an effect. If not, it is not named, and a note says so."""
         if any(e.identifiable and not e.at_bound for e in parameters.values()):
             return True
         text = "{} comes closer to these records, but they do not determine one of its parameters: it is not named."

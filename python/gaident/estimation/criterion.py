@@ -1,44 +1,47 @@
 """The formulas by which "is the gain enough?" and "is this noise?" are decided; `diagnosis/selection/model_space.py` asks them.
 
-**The information criterion.** A hypothesis with k fitted numbers, its noise model included, leaves the variance V/N of its
-errors. With the information I, the number of independent samples,
+**The information criterion.**
+A hypothesis with k fitted numbers, its noise model included, leaves the variance V/N of its errors.
+With the information I, the number of independent samples,
 
     BIC = I ln(V/N) + k ln I                  (Schwarz 1978)
 
 Under a noise model that makes the errors white, every sample counts: I = N. Before whitening the errors of a model that is not
-exact are slow: neighbouring samples say the same, and
+exact are slow: neighbouring samples are alike, and
 
     I = N / (1 + 2 sum_k rho(k))              (effective sample size; Bartlett 1946)
 
 with rho the autocorrelation of the errors about their mean, up to the first pair rho(2m-1) + rho(2m) that is not positive
-(Geyer 1992): from there on it is its own error.
-Errors of a shaft that swings have a rho that changes its sign, and hardly any sum; the sum of rho^2 is then above it and above
-`swings`, which white errors do not reach by chance. ln V is uncertain by sqrt(2/I) with
+(Geyer 1992): beyond it the estimate of rho is mostly error.
+Errors of a shaft that swings have a rho that changes its sign, so that its sum is small.
+The sum of rho^2 is then larger, and above `swings`, which white errors do not reach by chance.
+The standard deviation of ln V is then sqrt(2/I) with
 
     I = N / (1 + 2 sum_k rho(k)^2)            (variance of a mean square; Bartlett 1946)
 
-and slow errors beside them show in the spectrum alone: S(0) = V (1 + 2 sum_k rho(k)). There the lesser of these two counts.
+Slow errors beside the swinging ones show in the spectrum alone: S(0) = V (1 + 2 sum_k rho(k)). The lesser of both I counts.
 Every comparison of two models and every count of independent samples in the package is one of these formulas.
 
-**The specification test** (Hausman 1978). Least squares of whitened errors and of output errors estimate the same parameters
-where the errors are stationary noise; whitened, they are only more precise. With x_W and x_O the two estimates and V_O the sum
-of squared output errors,
+**The specification test** (Hausman 1978).
+Least squares of whitened errors and of output errors estimate the same parameters where the errors are stationary noise;
+whitened, they are only more precise. With x_W and x_O the two estimates and V_O the sum of squared output errors,
 
     H = I ln(V_O(x_W) / V_O(x_O))
 
-is then near chi-square with as many degrees of freedom as there are parameters that a fit moves. A larger H says that what the
-model leaves is no stationary noise (a friction that changes with load, angle and temperature, a torque that is itself measured):
-the noise model has taken a misfit for noise, and trusts the frequencies where that happens to be small. H is defined for two
-estimates of one model; two models are compared by the information criterion.
+is then near chi-square with as many degrees of freedom as there are parameters that a fit moves.
+A larger H says that what the model leaves is no stationary noise (a friction that changes with load,
+angle and temperature, a torque that is itself measured).
+The noise model then describes a misfit, and gives the most weight to the frequencies where the misfit is small.
+H is defined for two estimates of one model; two models are compared by the information criterion.
 
 **The variance ratio.** With sigma the standard deviation of the noise that the measured velocity itself shows,
 
     ratio = sqrt(V/N) / sigma
 
-is compared with the level that records without effects pass, by the errors that V is of. Whitened errors (`noise_ratio`) are the
-innovations, and may be smaller than the noise where that is slow. Errors before whitening (`free_run_ratio`), in the loop where
-there is one, have all that disturbs the axis beside the sensor's noise: their ratio is larger, and a misfit that the noise model
-has taken shows in them alone.
+is compared with the level that records without effects pass, by the errors that V is of.
+Whitened errors (`noise_ratio`) are the innovations, and may be smaller than the noise where that is slow.
+Errors before whitening (`free_run_ratio`), in the loop where there is one, have all that disturbs the axis beside the
+sensor's noise: their ratio is larger, and a misfit that the noise model has taken shows in them alone.
 """
 
 from __future__ import annotations
@@ -56,7 +59,7 @@ __all__ = ["Specification", "bic", "chi_square_bound", "cost_of", "effective_sam
 Vector = NDArray[np.float64]
 
 LOWEST = 8  # no decision: frequencies of a record's spectrum whose mean is S(0); that is uncertain by 1/sqrt(8)
-LAGS = 10  # no decision: of the samples, one in so many is a lag at which rho^2 is taken; at more it is mostly its own error
+SAMPLES_PER_LAG = 10  # no decision: rho^2 is taken at one lag for so many samples; at more it is mostly its own error
 
 
 def bic(variance: float, information: float, numbers: int) -> float:
@@ -65,20 +68,21 @@ def bic(variance: float, information: float, numbers: int) -> float:
 
 
 def cost_of(numbers: int, information: float) -> float:
-    """What so many fitted numbers cost: k ln I."""
+    """The penalty of k fitted numbers: k ln I."""
     return numbers * math.log(max(information, 1.0))
 
 
 def gained(before: float, after: float, information: float, numbers: int = 0) -> float:
-    """By how much BIC falls from a variance, or a sum of squares, to another of the same errors, for so many numbers more."""
+    """Decrease of BIC from one variance, or sum of squares, to another of the same errors, with `numbers` more parameters."""
     return bic(before, information, 0) - bic(after, information, numbers)
 
 
 def effective_samples(*errors: Vector) -> float:
-    """Independent samples in errors of colour, 1 at least and all of them at most.
+    """Number of independent samples in coloured errors, at least 1 and at most all samples.
 
-    N/(1 + 2 sum rho) of slow errors. Of such that swing, whose rho changes its sign, the lesser of N/(1 + 2 sum rho^2) and of
-    N V/S(0), the first count by the lowest frequencies of the spectrum.
+    N/(1 + 2 sum rho) of slow errors.
+    For errors that swing, whose rho changes its sign, the lesser of N/(1 + 2 sum rho^2) and of N V/S(0).
+    S(0) is taken from the lowest frequencies of the spectrum.
 
     errors: of one record each, (n_i,), samples that do not count being 0; no pair of samples of two records is a neighbour.
 
@@ -100,7 +104,7 @@ def effective_samples(*errors: Vector) -> float:
     pairs = (products[1:] / products[0])[: (longest - 1) // 2 * 2].reshape(-1, 2).sum(axis=1)
     negative = np.flatnonzero(~(pairs > 0.0))
     slow = float(pairs[: negative[0]].sum()) if len(negative) else float(pairs.sum())
-    squares = products[1 : 1 + longest // LAGS] ** 2 / products[0] ** 2
+    squares = products[1 : 1 + longest // SAMPLES_PER_LAG] ** 2 / products[0] ** 2
     chance = (count - np.arange(1, len(squares) + 1)) / count**2  # what rho^2 of white errors is in the mean
     swinging = float(np.sum(squares - chance))
     memory = 1.0 + 2.0 * slow  # no decision: as below

@@ -2,8 +2,7 @@
 
 A model is driven by the torque that the controller issued: as logged or, without a log, as the controller makes it from the
 command and the *measured* velocity.
-Noise inside the loop then acts in the model as it did on the drive, and what is left with the true parameters is the noise of the
-sensor and disturbance torques.
+Noise inside the loop then acts in the model as on the drive; the true parameters leave sensor noise and disturbance torques.
 """
 
 from __future__ import annotations
@@ -47,17 +46,16 @@ class DataSet:
     """Records, each also as driven by its torque (`driven`), both with an angle, measured or integrated from the velocity.
 
     controller: what closed the loop on the drive; None: unknown, the torque drives the model. `loop` is what a simulation closes.
-    turned: the record itself with that angle; free: torque-driven, without an angle that was not measured; read: the records
-    as the controller read them, which may contain samples that the fit leaves out. finest: no substep of a simulation is much
-    shorter [s]; resolution: step of the lattice that all velocities lie on [rad/s], 0: none; known_noise: standard deviation
-    of the velocity's noise where the records cannot show it; loop_follows: whether the logged torque is what the controller
-    makes; torque_measured: whether it is a measured one, with noise on it, behind the actuator; axis: "rotary" or "linear".
-    period: with which returns what is tied to the place [rad, m], of which orders count; None: not known. period_seen: it is the
-    one that the records show.
-    age: of the measured velocity [lines of the log]: one that is the difference of an encoder's angle is half a sample of the
-    controller old. What drives a model is late by as much, and in the loop that is simulated it is that difference.
-    other_ages: those that it may have as well; a model that does not exclude them is less certain by what they change.
-    found: numbers of the controller that the records show; what they may be off by is part of every deviation.
+    turned: the record itself with that angle; free: torque-driven, without an angle that was not measured.
+    read: the records as the controller read them, which may contain samples that the fit leaves out.
+    finest: no substep of a simulation is much shorter [s]; resolution: step of the lattice of all velocities [rad/s], 0: none.
+    known_noise: standard deviation of the velocity's noise where the records cannot show it; axis: "rotary" or "linear".
+    loop_follows: whether the logged torque is what the controller makes; torque_measured: it was measured, behind the actuator.
+    period: of what depends on the place [rad, m], orders count in it; None: not known. period_seen: it is what the records show.
+    age: of the measured velocity [lines of the log]; half a controller sample where it is the difference of an encoder's angle.
+    A torque that drives a model is delayed by the age. In a simulated loop the velocity is that difference.
+    other_ages: ages that are possible too; a model that does not exclude them is less certain by what they change.
+    found: numbers of the controller that the records show; their uncertainty is part of every deviation.
     """
 
     records: tuple[Record, ...]
@@ -113,7 +111,7 @@ class DataSet:
         return self if shown is None else replace(self, period=shown, period_seen=True)
 
     def aged(self, lines: float, others: Sequence[float] = ()) -> DataSet:
-        """The same with a measured velocity that is so many lines of the log old; others: which it may be as well."""
+        """The same with a measured velocity that is so many lines of the log old; others: ages that are possible too."""
         return replace(self, age=lines, other_ages=tuple(others))
 
     def older(self, loop: Controller | None) -> Controller | None:
@@ -169,15 +167,15 @@ class DataSet:
 
     @cached_property
     def substeps(self) -> int:
-        """Of a sample, for every model with effects that are not smooth."""
+        """Number of substeps of a sample, for every model with effects that are not smooth."""
         return int(2 ** min(max(math.ceil(math.log2(self.dt / self.finest)), 0), MOST_SUBSTEPS))
 
     @property
     def loop_only(self) -> bool:
-        """Whether no torque drives the motor as it did.
+        """Whether no torque is known that drove the motor: only the simulated loop can drive a model.
 
-        A replayed one keeps the error that one wrong velocity adds to its integral; one that is logged now and then lacks what it
-        did between the lines.
+        A replayed torque keeps the error that one wrong velocity adds to its integral.
+        A torque logged less often than the controller samples is not known between the lines.
         """
         lost = self.slower or (self.spoiled and not self.torque_logged)
         return lost and self.fits_in_loop
@@ -186,20 +184,22 @@ class DataSet:
     def fits_in_loop(self) -> bool:
         """Whether command and controller drive a model in fits too, from standstill.
 
-        Under a bare PI at the log's rate only where its integrator was empty before the records: the logged torque serves there.
+        Of a bare PI at the log's rate the integrator must have been empty before the records; else the torque drives the model.
         """
         return self.simulates_loop and not (self.pi is not None and any(self.stored))
 
     @property
     def left_in_loop(self) -> bool:
-        """Whether the loop drives a model that is left to itself: it is the drive's, not there for a measured torque's sake."""
+        """Whether the loop drives a model in a free run: it is the drive's, and does not only replace a measured torque."""
         return self.fits_in_loop and self.loop_follows
 
     @cached_property
     def simulates_loop(self) -> bool:
         """Whether command and controller can drive a model from standstill, with what the integrator stored.
 
-        Never where they do not make the logged torque, which a measured one shows less, or where it tells all and is not checked.
+        False where a commanded torque of the log does not follow from them.
+        False where a measured torque does not follow from them and the log is slower than the controller.
+        False where the torque tells all that the controller did and a record cannot be replayed to check it.
         """
         loop = self.loop
         if loop is None or any(self.moving) or not (self.loop_follows or (self.torque_measured and not self.slower)):

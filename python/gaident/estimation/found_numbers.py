@@ -1,4 +1,4 @@
-"""What the numbers of the controller that were found bring into a model, and what the model says of them.
+"""How the estimated numbers of the controller change a model, and how the model corrects these numbers.
 
     V(x, z) = |v(x, z)|^2/s^2 + (z - z_0)' C^-1 (z - z_0)
 
@@ -8,8 +8,9 @@ With E the slopes of the whitened errors v over z, J over x, and P what takes ou
     cov x = s^2 (J J')^-1 + S M S',   S = -(J J')^-1 J E',   M = C                                where x alone is fitted
                                                              M = (C^-1 + E P E'/s^2)^-1           where z is fitted too
 
-That is the covariance of both together, of which this is the part of x. z is moved in the directions in which it is independent,
-by one deviation: what no slope shows, as a filter that is hardly known, counts as it is.
+This is the part of x in the covariance of both together.
+The slopes E are differences by one deviation in the directions in which z is independent.
+So a number with a large deviation, such as that of a filter, counts with its full change and not with its slope.
 
 z is found by steps of Gauss and Newton, after each of which x is fitted again (variable projection, Golub and Pereyra 1973):
 
@@ -65,14 +66,14 @@ def _made(rec: Record, controller: Controller) -> Vector:
 
 
 def _joined(data: DataSet) -> DataSet:
-    """The data with numbers that what the errors of a model show moves from now on."""
+    """The data with numbers that are fitted with the model from now on."""
     return data if data.found is None else replace(data, found=data.found.joined())
 
 
 def variance_of(objective: Objective, fit: Fit, v: Vector) -> float:
     """Mean square of the whitened errors; of output errors of colour it grows by samples over independent samples.
 
-    Those say less than their number.
+    Such samples contain less than their number.
     """
     dof = max(objective.count - int(np.count_nonzero(fit.parameters.steps() > 0.0)), 1.0)
     repeats = 1.0 if isinstance(objective.family, Innovations) else objective.count / effective_samples(v)
@@ -142,7 +143,7 @@ def refined(
 
 
 def worth(objective: Objective, fit: Fit) -> float:
-    """What moving the numbers costs beside the criterion of the fit [BIC units]."""
+    """The cost of the changed numbers, to be added to the criterion of the fit [BIC units]."""
     found = fit.predictor.data.found
     if found is None or found.shown is None or found.covariance is None:
         return 0.0
@@ -188,10 +189,10 @@ def _answers(J: Matrix, E: Matrix) -> Matrix:
 
 
 def _of_age(objective: Objective, fit: Fit, age: float) -> Fit | None:
-    """The model with another age of the velocity; None where that leaves clearly more.
+    """The model with another age of the velocity; None where its errors are clearly larger.
 
-    Where the torque does not follow from the controller, what drives the model between the lines is not known, and a model that
-    leaves less may only make up for it: there no age is excluded.
+    Where the torque does not follow from the controller, it is not known between the lines of the log.
+    A wrong age may then compensate for the unknown torque, so that no age is excluded.
     """
     data = fit.predictor.data.aged(age)
     other = _under(objective, data, fit) if data.found is None or not data.found.joint else refined(objective, fit, data)
@@ -202,7 +203,8 @@ def _of_age(objective: Objective, fit: Fit, age: float) -> Fit | None:
 def _change(objective: Objective, hypothesis: Hypothesis, x: Vector, noise: NoiseFilter, v: Vector, by: Vector) -> Vector:
     """How the whitened errors change where the numbers of the controller are moved.
 
-    By a deviation one way or the other, the larger change; by the step of a difference the first way that the numbers can go.
+    Moves by a deviation are made in both directions, and the larger change counts.
+    A move by the step of a difference is made in the first direction that the numbers allow.
     """
     found = numbers_in(hypothesis)
     rows = [np.zeros(len(v))]
@@ -221,7 +223,7 @@ def _change(objective: Objective, hypothesis: Hypothesis, x: Vector, noise: Nois
 
 
 def _spread(objective: Objective, fit: Fit, v: Vector, J: Matrix, E: Matrix) -> Matrix:
-    """M along the moves."""
+    """M in the directions of the moves."""
     found = numbers_in(fit.hypothesis)
     if not found.joint or not len(E):
         return np.eye(len(E))

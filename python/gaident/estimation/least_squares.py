@@ -17,7 +17,7 @@ Matrix = NDArray[np.float64]
 
 NEARBY = 0.15, 0.3, 0.7  # no decision: of a base parameter, of its unit at least, of a step of an effect: where it is searched
 DAMPINGS = 10.0 ** np.arange(-3.0, 5.0)  # no decision: times the damping of the step before
-SETTLED = 0.02  # no decision: of the noise variance: a fall of the cost by less changes no decision
+NEGLIGIBLE_FALL = 0.02  # no decision: of the noise variance: a fall of the cost by less changes no decision
 
 
 def fit(objective: Objective, hypothesis: Hypothesis, x: Vector, noise: NoiseFilter, iterations: int) -> Fit:
@@ -76,7 +76,7 @@ def _fit(objective: Objective, hypothesis: Hypothesis, x: Vector, noise: NoiseFi
 
 def negligible(objective: Objective, fall: float, cost: float) -> bool:
     """Whether a fall of the cost changes no decision."""
-    return fall < SETTLED * cost / max(objective.count, 1.0)
+    return fall < NEGLIGIBLE_FALL * cost / max(objective.count, 1.0)
 
 
 def damped_steps(A: Matrix, g: Vector, damping: Matrix) -> Matrix:

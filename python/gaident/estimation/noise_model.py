@@ -44,7 +44,7 @@ MIDDLE = 4, 7  # no decision: place in the grid of both where a search begins
 
 @dataclass(frozen=True, eq=False)
 class NoiseFilter:
-    """b, a: coefficients of B and A from q^0 on, both 1 there; size: numbers that were estimated for it."""
+    """b, a: coefficients of B and A from q^0 on, both beginning with 1; size: number of estimated parameters."""
 
     b: Vector = field(default_factory=lambda: np.ones(1))
     a: Vector = field(default_factory=lambda: np.ones(1))
@@ -57,7 +57,7 @@ class NoiseFilter:
 
     @cached_property
     def power(self) -> float:
-        """Sum of the squared impulse response: what becomes of white noise of variance 1."""
+        """Sum of the squared impulse response: the variance of filtered white noise of variance 1."""
         if len(self.a) == 1:
             return float(self.b @ self.b)
         h = self.of(np.eye(1, 4096), (4096,))
@@ -87,9 +87,9 @@ Grid = dict[tuple[int, int], NoiseFilter | None]
 
 
 def autoregression(parts: Sequence[Vector], highest: int = HIGHEST, floor: float = 0.0) -> Vector:
-    """Coefficients by least squares, order by BIC: of strong colour the biased autocovariance takes too little.
+    """Coefficients by least squares, order by BIC: the biased autocovariance whitens strongly coloured errors too little.
 
-    floor: variance of white noise that is taken to be on the parts beside what they show.
+    floor: variance of white noise that is added to that of the parts.
     """
     products, total = _products(parts, highest), sum(len(e) for e in parts)
     order = len(_by_autocovariance(products, total, floor))

@@ -6,14 +6,15 @@ e is the *raw* error. What becomes of it is the choice of a noise family:
 
 *Innovations*: every hypothesis has a noise filter H^-1 of its own, which is part of it and counts in its criterion, so that no
 effect is whitened away by a filter that was estimated without it, and none is favoured by one estimated with it.
-With almost no noise on the velocity, the filter would give most weight to what does not matter: the exact instant of a reversal,
-the corner that a jump of friction makes there.
+With almost no noise on the velocity, the filter would give most weight to details: the exact instant of a reversal,
+and the corner that a jump of friction makes there.
 White noise of a variance f (`floor`) is then added to the error of every hypothesis alike, as if it had been on the velocity: H
 is that of e plus this noise, and V/N becomes V/N + f |h|^2, h the impulse response of H^-1.
 
 *Output errors*: the same filter for every hypothesis, none (H = 1) or a prefilter (see `prefilter.py`), with the information of
-the independent samples (see `criterion.py`). Behind a prefilter errors are *weighed*, alike for all hypotheses, and not
-*whitened*, by a filter of each. That is what is left where the errors are a misfit and no stationary noise.
+the independent samples (see `criterion.py`).
+Behind a prefilter errors are *weighed*, alike for all hypotheses, and not *whitened*, by a filter of each.
+Output errors are used where the errors are a misfit and no stationary noise.
 """
 
 from __future__ import annotations
@@ -51,11 +52,11 @@ class NoiseFamily(Protocol):
 
     @property
     def floor(self) -> float:
-        """Variance of white noise that is taken to be on the velocity beside what it shows [(rad/s)^2]."""
+        """Variance of white noise that is added to the noise that the velocity shows [(rad/s)^2]."""
         ...
 
     def information(self, count: float) -> float:
-        """Independent samples among so many."""
+        """Number of independent samples among `count` samples."""
         ...
 
     @property
@@ -116,9 +117,9 @@ class Innovations:
 class OutputErrors:
     """Raw errors behind one prefilter, None: as they are; samples: how many of them are independent.
 
-    inertia: where the torque is measured, that of the regression [kg m^2], which noise on the torque does not bias. Compared as
-    velocities, errors of a noisy torque get smaller with a heavier axis that follows it less; as torques they do not. A lighter
-    axis gains nothing: one that dry friction holds has no torque error at all.
+    inertia: where the torque is measured, that of the regression [kg m^2], which noise on the torque does not bias.
+    A heavier axis follows a noisy torque less: its velocity errors get smaller, but its torque errors do not.
+    A lighter axis must gain nothing: an axis that dry friction holds has no torque error at all.
     """
 
     samples: float
@@ -128,11 +129,11 @@ class OutputErrors:
 
     @property
     def weighs_inertias(self) -> bool:
-        """Where the torque is measured."""
+        """See `NoiseFamily`: true where the torque is measured."""
         return self.inertia is not None
 
     def information(self, count: float) -> float:
-        """No more than there are."""
+        """See `NoiseFamily`: at most `count`."""
         return min(self.samples, count)
 
     def prefiltered(self, E: Matrix, lengths: Sequence[int], inertias: Vector | None = None) -> Matrix:
@@ -179,7 +180,7 @@ class Objective:
             object.__setattr__(self, "measured", self.data.velocity)
 
     def once(self, key: Hashable, work: Callable[[], T]) -> T:
-        """What is asked for again, on another way to the same model, is remembered: work depends on its key alone."""
+        """The result of `work`, which depends on its key alone and is computed once."""
         if key not in self._memory:
             self._memory[key] = work()
         found: T = self._memory[key]  # type: ignore[assignment]
@@ -200,11 +201,11 @@ class Objective:
         return self.once(_of_error(fit.hypothesis, fit.x), lambda: self.errors(fit.hypothesis, fit.x[None, :])[0])
 
     def known_error(self, hypothesis: Hypothesis, x: Vector) -> Vector | None:
-        """The raw error at x where it was asked for before; None where it was not."""
+        """The raw error at x where it was computed before; else None."""
         return self._memory.get(_of_error(hypothesis, x))  # type: ignore[return-value]
 
     def remember_error(self, hypothesis: Hypothesis, x: Vector, error: Vector) -> None:
-        """The raw error at x, which is not simulated again."""
+        """Store the raw error at x, so that it is not simulated again."""
         self._memory.setdefault(_of_error(hypothesis, x), error.copy())
 
     def unwhitened_errors(self, fit: Fit) -> Vector:

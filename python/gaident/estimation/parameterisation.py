@@ -5,10 +5,10 @@
     two masses        [ln K, a, e1, e0, f1, f0 | effects | start states]  G(s) = K (s^2 + f1 s + f0) / ((s + a) (s^2 + e1 s + e0))
 
 K = 1/J is positive by construction: whatever the start, no fit can end at a negative inertia.
-Below its resonance an axis on a spring or under gravity answers as if it had one.
+Below its resonance an axis on a spring or under gravity responds as if its inertia were negative.
 c = k/J, k the stiffness of a spring between the axis and the ground.
-a, c, e1, e0, f1, f0 in units of their own size, so that a step of 1 is large and one of 1e-4 small for every entry. Pairs pass
-smoothly from complex to real roots.
+a, c, e1, e0, f1, f0 are in units of their own size: for every entry a step of 1 is large and one of 1e-4 is small.
+Pairs pass smoothly from complex to real roots.
 """
 
 from __future__ import annotations
@@ -85,7 +85,7 @@ class Parameterisation:
     def of(cls, model: Model, scales: Scales, moving: Sequence[bool]) -> Parameterisation:
         """That of a linear model of one mass, one mass on a spring, or two (effects are added by `extended`).
 
-        Its scales are those given, as the model describes them.
+        Its scales are the given ones with the values of the model's mechanism.
         """
         values = mechanism(model)
         floor = 2.0 / scales.duration  # no decision: a scale

@@ -1,13 +1,15 @@
-"""With which length a force returns on a linear axis, where nobody says it: the pitch of a screw, or of the poles.
+"""The length with which a force returns on a linear axis, where it is not given: the pitch of a screw, or of the poles.
 
     u = J a + (B+ w or B- w) + (C+ or -C-) + A cos(2 pi x/P) + B sin(2 pi x/P)
 
 Inertia and friction are fitted alone, the last two columns are compared with what they leave, for every P that the path shows a
-few times. One is the period where BIC falls by more than a free function of one signal may let it (P is a number, too, and so
-many were tried), and by a material share. A hum of one frequency is such a wave while the speed does not change: a frequency in
-time has to explain less, beyond the margin of two rivals.
+few times.
+P is the period where BIC falls by more than the limit for a free function of one signal, and by a material share.
+The limit is that high because P is fitted too, and many values were tried.
+At constant speed a hum of one frequency is such a wave too.
+So P must explain more than any frequency in time, by the margin of two rivals.
 
-The strongest wave may be a part of the pitch: where others of which it is a multiple stand beside it, the pitch is theirs.
+The strongest wave may be a harmonic of the pitch: where other harmonics of a longer pitch stand beside it, that pitch is taken.
 A pitch is a round number: of all lengths within two deviations the one with the fewest digits.
 """
 

@@ -62,7 +62,7 @@ class Predictor(Protocol):
 
     @property
     def difference(self) -> float:
-        """Step of a forward difference, in parts of what makes a difference: stops and impacts make the error not smooth."""
+        """Step of a forward difference, as a part of a change that matters: with stops and impacts the error is not smooth."""
         ...
 
     def velocities(self, parameters: Parameterisation, X: Matrix) -> Matrix:
@@ -162,9 +162,10 @@ class ObserverLoop:
 
         u = u_record + s C(q) (w_measured - w),   s = `observer_share`
 
-    A predictor with a fixed observer (Ljung 1999, chapter 4). A gap or an impact makes the path of a model that the torque alone
-    drives depend on rounding after some of them; in the drive's loop, s = 1, the whole of the controller's answer to the
-    sensor's noise is missing from the simulation. An effect inside the controller is simulated in the drive's loop.
+    A predictor with a fixed observer (Ljung 1999, chapter 4).
+    After some impacts the motion of a model that the torque alone drives depends on rounding errors.
+    In the drive's loop, s = 1, the controller's whole answer to the noise of the sensor is missing from the simulation.
+    An effect inside the controller is simulated in the drive's loop.
     """
 
     data: DataSet

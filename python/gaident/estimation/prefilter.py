@@ -1,20 +1,21 @@
 """The prefilter of output errors: the velocity error as the torque error that makes it.
 
-Where a model is not exact, what is minimised decides what comes out. A prefilter L weighs the frequencies of the errors (Ljung
-1999, chapter 14),
+Where a model is not exact, what is minimised decides what comes out.
+A prefilter L weighs the frequencies of the errors (Ljung 1999, chapter 14),
 
     e_L(n) = L(q) e(n),   minimise sum of e_L^2
 
-The free run of a rigid axis integrates every torque that the model lacks: e = d/(J s + B). Its errors are slow, and a long
-record contains few of them that are independent. With
+The free run of a rigid axis integrates every torque that the model lacks: e = d/(J s + B).
+Its errors are slow, and a long record contains few of them that are independent. With
 
     L(s) = (s + c) F(s)
 
 and c = B/J, e_L is the lacking torque d over the inertia, as in the inverse-dynamics regression, but of a simulation: every
-effect, several masses and a closed loop take part in it. A larger c counts the velocity as well; `balance` gives the one at
-which both count alike. There a torque that the model lacks still biases the inertia: the slope of its error is the smaller, the
-heavier the axis. F is the zero-phase low-pass of that regression: differences of a sampled velocity say nothing above its
-cutoff. L is fixed for all hypotheses, and scaled so that white noise keeps its variance.
+effect, several masses and a closed loop take part in it.
+A larger c counts the velocity as well; `balance` gives the one at which both count alike.
+There a torque that the model lacks still biases the inertia: the slope of its error is the smaller, the heavier the axis.
+F is the zero-phase low-pass of that regression: differences of a sampled velocity say nothing above its cutoff.
+L is fixed for all hypotheses, and scaled so that white noise keeps its variance.
 
 L. Ljung, System Identification: Theory for the User, 2nd ed., Prentice Hall 1999.
 """

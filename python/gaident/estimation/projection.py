@@ -13,7 +13,7 @@ Matrix = NDArray[np.float64]
 WORST = 1e100  # no decision: the cost of a model that diverges, which none reaches
 """The cost of a model that diverges."""
 
-RANK = 1e-12  # no decision: of the largest eigenvalue, what a Gram matrix is exact to
+GRAM_RANK = 1e-12  # no decision: of the largest eigenvalue, what a Gram matrix is exact to
 
 
 def sums_of_squares(V: Matrix) -> Vector:
@@ -51,7 +51,7 @@ def inverse_of(A: Matrix, sizes: Vector | None = None) -> Matrix:
     lengths = np.sqrt(np.maximum(np.diag(A), 0.0)) if sizes is None else sizes
     lengths = np.where(lengths == 0.0, 1.0, lengths)
     scale = np.outer(lengths, lengths)
-    return np.asarray(np.linalg.pinv(A / scale, rcond=RANK, hermitian=True) / scale)
+    return np.asarray(np.linalg.pinv(A / scale, rcond=GRAM_RANK, hermitian=True) / scale)
 
 
 def slopes(V: Matrix, h: Vector) -> Matrix:

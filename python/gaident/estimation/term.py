@@ -41,7 +41,7 @@ class Scales:
     two_masses: bool
     integral: float  # N m, largest torque: no integrator state is larger
     blocks: int = 1  # samples of the log in one of dt: a long record is searched on a coarser grid first
-    period_seen: bool = False  # with which length the place returns is what the records show: a fit may move it
+    period_seen: bool = False  # the period was estimated from the records; a fit may change it
 
     @property
     def log_dt(self) -> float:
@@ -54,11 +54,13 @@ class Term:
     """One effect as the fit sees it.
 
     natural: coordinates (n, k) -> parameters (n, m) in the order of the effects table; coordinates: its inverse for one vector.
-    limits, starts: bounds (k pairs) and start rows for given scales. steps: size of each coordinate that makes a difference; 0
-    for one that is chosen by search, not by slope (an order, of a period that is known). nested: names of simpler effects that
-    this one contains.
-    family: of effects that exclude each other in one model, "" for none; excludes: names of others that it does not stand beside;
-    beside: names of others of which it needs one in the model, on whose torque its own depends; empty where it needs none.
+    limits, starts: bounds (k pairs) and start rows for given scales.
+    steps: of each coordinate, a change that matters.
+    0 where a search chooses it, not a slope (an order, of a period that is known).
+    nested: names of simpler effects that this one contains.
+    family: of effects that exclude each other in one model, "" for none.
+    excludes: names of other effects that cannot be in the same model.
+    beside: names of effects of which one must be in the model, because this one depends on its torque; empty where none must.
     """
 
     name: str
@@ -78,12 +80,12 @@ class Term:
     orders: tuple[int, int] = (1, 1)  # lowest and highest order of a harmonic
     neutral: Callable[[float, Scales], tuple[float, ...]] | None = None  # the nested effect of this level as this one
     proportional: bool = False  # its torque is proportional to its one coordinate
-    multimodal: bool = False  # a stop or an impact more or less makes valleys: fitted in the loop first, searched globally
+    multimodal: bool = False  # one stop or impact more makes another local minimum: fitted in the loop first, searched globally
     domains: frozenset[str] = frozenset()  # signals whose free function imitates it
     levels: bool = False  # its first coordinate is the level of dry friction
     time_varying: bool = False  # its size changes in the course of a record: a mean over the record is none of its parameters
     late: bool = False  # it makes the measured velocity late, which a logged angle shows
-    resonates: bool = False  # a pair of poles and zeros in series with the mechanism: a second mass in disguise
+    resonates: bool = False  # a pair of poles and zeros in series with the mechanism, equivalent to a second mass
     poles: Callable[[Vector], tuple[complex, ...]] | None = None  # poles in series [rad/s] of natural parameters
     seen_angle: Callable[[Vector, Vector, Vector], Vector] | None = None  # (seen angle, velocity, parameters) -> true angle
     limiting: Callable[[Vector], Limiting] | None = None  # what an effect in the controller limits there

@@ -2,13 +2,13 @@
 
 Whitened, least squares has the covariance s^2 (J J')^-1 over x; parameters in the table's own units follow to first order.
 
-Beside a gap that is too little: the error depends on x by when impacts happen, which no slope at one point tells. There every
-standard deviation is at least that of the jackknife over K blocks of the records,
+Beside a gap these are too small: x changes the times of the impacts, and a slope at one point does not show that.
+There every standard deviation is at least that of the jackknife over K blocks of the records,
 
     var x = (K-1)/K sum_k (x_(k) - mean x_(k))^2,   x_(k) fitted without block k
 
-Measured on eight hidden gaps: off the truth by up to 14 of the first, 3.5 of the second kind; but by 17 of the second on one
-under a coloured torque, whose impacts no model foresees.
+Measured on eight hidden gaps: errors of up to 14 deviations of the first kind, 3.5 of the second kind.
+On one gap under a coloured torque, whose impacts no model predicts, the error was 17 deviations of the second kind.
 """
 
 from __future__ import annotations
@@ -35,12 +35,12 @@ Matrix = NDArray[np.float64]
 
 
 def covariance_of(objective: Objective, fit: Fit) -> Matrix:
-    """Covariance of x; infinite where the record says nothing, 0 for entries that were not moved. Worked out once for a fit."""
+    """Covariance of x, computed once for a fit; infinite where the record does not determine it, 0 for entries not fitted."""
     return objective.once(("covariance", fit.key), lambda: _covariance(objective, fit))
 
 
 def controller_part(objective: Objective, fit: Fit) -> Matrix:
-    """The part of the covariance that the numbers of the controller bring in. Worked out once for a fit."""
+    """The part of the covariance that comes from the numbers of the controller. Computed once for a fit."""
     return objective.once(("controller part", fit.key), lambda: of_controller(objective, fit))
 
 

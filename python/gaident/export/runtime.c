@@ -205,8 +205,9 @@ static void gaident_observer(const gaident_drive *k, gaident_memory *s, double T
     s->x[0] = w_next;
 }
 
-/* Both ends of the shaft under friction: each mass sticks or slips. The load's equation is solved with what the motor does, which
-   is found with the load's friction of the round before; the rounds converge to rounding error. */
+/* Both ends of the shaft under friction: each mass sticks or slips.
+   The load's equation is solved with what the motor does, which is found with the load's friction of the round before;
+   the rounds converge to rounding error. */
 static void gaident_both_dry(const gaident_drive *k, gaident_memory *s, double w_free, double w_free_load, double t, double *w_next,
                              double *w_next_load) {
     const double across = k->motor[0] + k->coupling[0], back = k->motor[1], beta = k->motor[0], beta_load = k->motor[1] + k->coupling[1];

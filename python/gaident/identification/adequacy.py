@@ -1,10 +1,9 @@
 """Does the linear model hold? Tests on the residual that are valid under feedback.
 
-Whiteness says whether anything predictable is left; noise of a colour of its own leaves that too. What falsifies the *model*
-is a residual
-that still depends on the input or on the motion: whitened, and with what a change of the model's own parameters could explain
-taken
-out, it is regressed on the input at several lags, a constant, and sign(w), w|w| of the simulated velocity. F-test.
+Whiteness says whether anything predictable is left; noise of a colour of its own leaves that too.
+What falsifies the *model* is a residual that still depends on the input or on the motion:
+whitened, and with what a change of the model's own parameters could explain taken out,
+it is regressed on the input at several lags, a constant, and sign(w), w|w| of the simulated velocity. F-test.
 """
 
 from __future__ import annotations
@@ -24,7 +23,7 @@ __all__ = ["Sums", "assess", "independence_p", "regressor_lags", "white_lags"]
 
 Vector = NDArray[np.float64]
 
-LAGS = (0, 1, 2, 4, 8, 16, 32)  # no decision: of the input, which a test looks at
+INPUT_LAGS = (0, 1, 2, 4, 8, 16, 32)  # no decision: of the input, which a test looks at
 
 
 @dataclass(frozen=True)
@@ -47,11 +46,12 @@ class Sums:
 def regressor_lags(lengths: Sequence[int], open_loop: bool) -> list[int]:
     """Lags of the input that the residual is tested on.
 
-    open_loop: the input is a torque. It acts from the next sample on, and if a controller made it, it carries the noise of its
-    own sample: lag 0 would then be correlated with the residual by construction and is left out.
+    open_loop: the input is a torque.
+    It acts from the next sample on, and if a controller made it, it carries the noise of its own sample:
+    lag 0 would then be correlated with the residual by construction and is left out.
     """
     # no decision: lags that a record can show; the test has a level
-    return [k for k in LAGS if k < min(lengths) // 4 and not (open_loop and k == 0)]
+    return [k for k in INPUT_LAGS if k < min(lengths) // 4 and not (open_loop and k == 0)]
 
 
 def white_lags(lengths: Sequence[int]) -> int:

@@ -6,8 +6,9 @@ the logged torque, and the numbers are those with the least squares of what is l
     d(k) = u_logged(k) - u(k; numbers),   k where no limit acts;   c(k) = d(k) - rho d(k-1),   sum (c - mean c)^2 -> min
 
 The mean is taken of each stretch between two limits: what the integrator stored before it is free.
-Between the lines of a slower log the velocity follows a cubic spline. What it really did there is lost and adds up in the
-integrator: d is then a random walk, and rho, its correlation from line to line, says how far (Cochrane and Orcutt 1949).
+Between the lines of a slower log the velocity follows a cubic spline.
+What it really did there is lost and adds up in the integrator: d is then a random walk, and rho,
+its correlation from line to line, says how far (Cochrane and Orcutt 1949).
 The gains are linear in u: for given filters and position gain they start from a linear least squares (`_linear_start`).
 """
 
@@ -45,8 +46,8 @@ BOUNDED = ("kp", "ki", "command_weight")  # no controller has one below 0
 GAINS = (*BOUNDED, "acceleration_feedforward", "friction_feedforward")
 """Linear in the torque; the others are searched by their logarithm, but a numerator's damping and a share."""
 LOGARITHMIC = ("gain", "time_constant", "frequency", "denominator_damping")
-STEP = 1e-5  # no decision: of a number, for a slope
-ROUNDING = 1e-12  # no decision: of the torque's deviation, what a sum is exact to
+SLOPE_STEP = 1e-5  # no decision: of a number, for a slope
+DEVIATION_ROUNDING = 1e-12  # no decision: of the torque's deviation, what a sum is exact to
 
 
 @dataclass(frozen=True)
@@ -230,7 +231,7 @@ class _Fit:
         grid = sorted((float(np.sum(free(x) ** 2)), tuple(x)) for x in (np.clip(x, low, high) for x in points))
         rho = 0.0
         off = self.free(rho)
-        enough = ROUNDING * float(np.sum(self.logged[self.used] ** 2))
+        enough = DEVIATION_ROUNDING * float(np.sum(self.logged[self.used] ** 2))
         tried: list[tuple[float, tuple[float, ...]]] = []
         for _, point in grid[: POLICY.best_points]:
             tried.append(self.searched(off, np.array(point), low, high, POLICY.usual))
@@ -249,7 +250,7 @@ class _Fit:
         from scipy.optimize import least_squares
 
         inside = off_bound(start, low, high)
-        size = max(float(np.sqrt(np.mean(off(inside) ** 2))), ROUNDING * float(np.std(self.logged)), SMALLEST)
+        size = max(float(np.sqrt(np.mean(off(inside) ** 2))), DEVIATION_ROUNDING * float(np.std(self.logged)), SMALLEST)
         found = least_squares(
             lambda x: off(x) / size, inside, bounds=(low, high), x_scale="jac", xtol=1e-12, ftol=1e-10, gtol=1e-14,
             max_nfev=evaluations,
@@ -350,7 +351,7 @@ class _Fit:
         """(lines, numbers): how `off` changes with each number."""
         slopes = []
         for k in range(len(x)):
-            moved = STEP * max(abs(float(x[k])), STEP) * np.eye(len(x))[k]
+            moved = SLOPE_STEP * max(abs(float(x[k])), SLOPE_STEP) * np.eye(len(x))[k]
             up, down = x + moved, x - moved if x[k] - moved[k] >= low[k] else x
             slopes.append((off(up) - off(down)) / (up[k] - down[k]))
         table: Matrix = np.array(slopes).T
@@ -363,7 +364,7 @@ class _Fit:
         count = int(len(at) - len(x) - len(np.unique(self.stretch[self.used])))
         free_left = self.free(0.0)(x)
         size = float(np.std(self.logged[self.used]))
-        sigma = max(float(np.sqrt(np.sum(at**2) / max(count, 1))), ROUNDING * size)
+        sigma = max(float(np.sqrt(np.sum(at**2) / max(count, 1))), DEVIATION_ROUNDING * size)
         spread, back = inverse(J)
         # Where linear interpolation of the velocity, or another correlation, would have put the numbers.
         linear = back @ (self.free(rho, straight=True)(x) - at)
@@ -382,7 +383,7 @@ class _Fit:
         at_end = np.isfinite(wide) & ((x - low < wide) | (high - x < wide))
         bound = [bool(end) and f not in (*GAINS, "numerator_damping") for end, f in zip(at_end, self.fields, strict=True)]
         beyond = x - back @ at
-        rest = max(float(np.sqrt(np.sum((at + J @ (beyond - x)) ** 2) / max(count, 1))), ROUNDING * size)
+        rest = max(float(np.sqrt(np.sum((at + J @ (beyond - x)) ** 2) / max(count, 1))), DEVIATION_ROUNDING * size)
         own_std = rest * np.sqrt(np.diag(spread))
         free = [
             float(b) if f in BOUNDED and v <= near * abs(b) and b < -POLICY.check_deviations * s else 0.0

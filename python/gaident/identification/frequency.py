@@ -8,10 +8,10 @@
     1/K    = sum over pairs of the m windows and c frequencies of |rho|^2 / (m c)^2
     coherence = min(|S_wr|^2 / (S_ww S_rr), |S_ur|^2 / (S_uu S_rr))
 
-Inside a loop, noise on the velocity comes back in the torque, and H1 then tends to -1/C where the noise is large. The command
-does not know the noise: with it as the instrument (joint input-output) that bias is gone. A record has finite windows, and a
-drive is not linear; a model simulated on the same record and put through the same estimate suffers both alike, so that these two
-may be compared where the bare curve of the model may not.
+Inside a loop, noise on the velocity comes back in the torque, and H1 then tends to -1/C where the noise is large.
+The command does not know the noise: with it as the instrument (joint input-output) that bias is gone.
+A record has finite windows, and a drive is not linear; a model simulated on the same record and put through the same estimate
+suffers both alike, so that these two may be compared where the bare curve of the model may not.
 """
 
 from __future__ import annotations

@@ -3,8 +3,8 @@
     w(n) = sum_{i=0..N} alpha_i r(n-i) + sum_{i=1..N} beta_i w(n-i) + v(n) = phi(n)' theta + v(n)
     theta = (alpha_0..alpha_N, beta_1..beta_N),   D(z) = 1 - beta_1/z - ... - beta_N/z^N
 
-Plain        sum_n phi(n) v(n) = 0, least squares. Noise on w stands in phi as well and biases theta (errors in variables); the
-             finer the sampling, the more.
+Plain        sum_n phi(n) v(n) = 0, least squares.
+             Noise on w is in phi too and biases theta (errors in variables), the more, the finer the sampling.
 Instruments  sum_n z(n) v(n) = 0, z(n) = phi(n) of the noise-free answer of the last estimate: no bias from noise that is
              independent of r.
 Whitening    white noise e on w makes v = D e, far from white: r and w are first filtered by 1/D of the last estimate
@@ -148,8 +148,8 @@ def least_squares(
 
     References
     ----------
-    K. Steiglitz, L. E. McBride, IEEE Transactions on Automatic Control 10, 1965 (whitening). P. C. Young, A. J. Jakeman,
-    International Journal of Control 29, 1979 (refined instrumental variables: both).
+    K. Steiglitz, L. E. McBride, IEEE Transactions on Automatic Control 10, 1965 (whitening).
+    P. C. Young, A. J. Jakeman, International Journal of Control 29, 1979 (refined instrumental variables: both).
 
     Examples
     --------

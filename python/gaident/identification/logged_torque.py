@@ -6,9 +6,9 @@ What the velocity did between the lines is lost: d is compared with what other i
     a straight line instead of a cubic spline, and that spline with white noise between the lines, as large as that at the lines,
 
 which the integrator adds up: all three without their correlation from line to line, rho (Cochrane and Orcutt 1949).
-An anti-windup at a limit decides at samples between the lines, too, whether the integral moves. So the integral behind a limit is
-open by what it moves in a line where the torque comes to its limit, and in one where it leaves it, 2 ki dt |e|, and what is
-compared lies between limits.
+An anti-windup at a limit decides also at samples between the lines whether the integral changes.
+So the integral after a limit is uncertain by its change in one line where the torque reaches the limit,
+and by that in one line where it leaves it: 2 ki dt |e| together. Only stretches between limits are compared.
 
 Where it does not follow, one number of the controller at a time is estimated from the same signals, as one that is not known
 (`corrected`). Identification and diagnosis use what comes out. No plant is involved.
@@ -142,7 +142,7 @@ class Corrected(NamedTuple):
 def corrected(records: Sequence[Record], controller: Controller) -> Corrected | None:
     """The other interpolation of its command, or the one number, with which the torque of all records follows.
 
-    None where there is none, or several numbers are as good.
+    None where no change is enough, or several numbers are as good.
     """
     for other in controller.interpolations(records[0].dt)[1:]:
         if not _doubts(records, other):

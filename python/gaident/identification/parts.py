@@ -1,7 +1,8 @@
 """Coarse to fine: which part of long records the search looks at.
 
-A search needs samples that carry excitation rather than all there are. It runs on one window of each of the records that
-move most, some ten thousand samples together; what it finds is then fitted, compared and judged on all samples (`identify`).
+A search needs samples that carry excitation rather than all there are.
+It runs on one window of each of the records that move most, some ten thousand samples together;
+what it finds is then fitted, compared and judged on all samples (`identify`).
 """
 
 from __future__ import annotations
@@ -40,9 +41,10 @@ def search_parts(records: Sequence[Record], controller: PI | None, moving: Seque
 def _window(rec: Record, controller: PI | None, moving: bool, length: int) -> tuple[float, int, int]:
     """(rank among records, first sample, end) of the window of a record that is excited most.
 
-    Excitation: changes of the input and spread of the velocity, each relative to the most in this record. A start at rest needs
-    no unknown state and is taken already for half of the most. Records are ranked by the variance of the velocity in their
-    window. A window begins at a whole number of its `grid` equal blocks.
+    Excitation: changes of the input and spread of the velocity, each relative to the most in this record.
+    A start at rest needs no unknown state and is taken already for half of the most.
+    Records are ranked by the variance of the velocity in their window.
+    A window begins at a whole number of its `grid` equal blocks.
     """
     source = rec.torque if controller is None else rec.command
     assert source is not None  # checked on entry to identify()

@@ -2,9 +2,9 @@
 
     BIC = N ln(RSS_w / N) + k ln N,   k = 1 + p + 2 q and the start states
 
-RSS_w is the least sum of squares of the whitened simulation error. One filter serves all structures, estimated on the residual of
-the one that fits best, so that no structure is whitened with its own mistakes. The *smallest* structure within 10 units of the
-best wins.
+RSS_w is the least sum of squares of the whitened simulation error.
+One filter serves all structures, estimated on the residual of the one that fits best,
+so that no structure is whitened with its own mistakes. The *smallest* structure within 10 units of the best wins.
 A pole and a zero closer than 2 % to each other fit noise and are charged 10 units.
 """
 
@@ -135,9 +135,10 @@ def is_chain(c: Candidate) -> bool:
 def smallest_mechanism(scores: Sequence[Candidate], samples: int) -> int | None:
     """What to report where the data contradict every linear structure: index of the smallest mechanism, None where there is none.
 
-    An information criterion supposes that one of the models is true. Where none is, every module more absorbs a little of what
-    is missing, and the largest structure wins without meaning anything. Then only chains of masses (p = 1, q = 0, 2, 4, ...) are
-    considered, and a mass more has to halve the whitened error sum (`another_mass`), which noise-like misfit does not let it do.
+    An information criterion supposes that one of the models is true.
+    Where none is, every module more absorbs a little of what is missing, and the largest structure wins without meaning anything.
+    Then only chains of masses (p = 1, q = 0, 2, 4, ...) are considered, and a mass more has to halve the whitened
+    error sum (`another_mass`), which noise-like misfit does not let it do.
     """
     chains = {c.q: i for i, c in enumerate(scores) if is_chain(c)}
     if not chains:

@@ -104,8 +104,8 @@ def driven_by(rec: Record, controller: Controller) -> Record:
     """The record with the torque that drove the motor, held over each line of the log [N m], and no more than drives it.
 
     Where the log has a line for each of the controller's samples, that is the logged torque, or the one that the controller
-    makes of the measured signals. Of a torque logged every r-th sample, it is the mean over its r samples between
-    the lines, see `_at_its_clock`.
+    makes of the measured signals.
+    Of a torque logged every r-th sample, it is the mean over its r samples between the lines, see `_at_its_clock`.
 
     A known delay of the controller is part of it: `late`. Raises RecordError where a torque is neither logged nor can be made.
     """

@@ -106,8 +106,8 @@ def register(
     Parameters
     ----------
     name : str
-        Name of the effect, as of a variable, not that of a built-in effect. Saved results name it and load only where it is
-        registered.
+        Name of the effect, as of a variable, not that of a built-in effect.
+        Saved results name it and load only where it is registered.
     parameters : sequence of Parameter
         Their bounds are needed: between them `gaident.diagnose` looks, from `starts` or values spread between the bounds.
         With the neutral values the effect has to do nothing.

@@ -93,7 +93,8 @@ class Model:
         name : str
             Name of the effect, see `gaident.effects.table()`.
         side : {"motor", "load"}
-            Where a shaft effect acts. With two masses it may be the load: the effect then has the load's velocity and angle,
+            Where a shaft effect acts.
+            With two masses it may be the load: the effect then has the load's velocity and angle,
             which starts where the motor's does. An effect may be present at both sides, with parameters of its own at each.
         **parameters : float
             All its parameters by name, SI units.
@@ -262,8 +263,9 @@ class Model:
         Parameters
         ----------
         dt : float, optional
-            None: continuous, scipy.signal.ZerosPolesGain. A sample time [s]: sampled behind a zero-order hold,
-            scipy.signal.StateSpace, exact with a delay of any fraction of a sample.
+            None: continuous, scipy.signal.ZerosPolesGain.
+            A sample time [s]: sampled behind a zero-order hold, scipy.signal.StateSpace,
+            exact with a delay of any fraction of a sample.
         pade : int, optional
             Order, 1 to 10, of the Pade approximation of a transport_delay in the continuous system.
 

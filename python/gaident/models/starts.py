@@ -19,9 +19,9 @@ def noise_std(velocity: NDArray[np.float64], step: float = 0.0) -> float:
 
     step: of the lattice that the signal lies on, where it is known [rad/s]; rounding alone then makes step/sqrt(12).
 
-    A third difference of white noise has the variance 1 + 9 + 9 + 1 = 20 times the noise's. Runs of four equal values and more
-    are left out: an axis at rest, or a coarse encoder between two of its steps, shows no noise. Of a long signal evenly spaced
-    stretches, a million samples in all, will do.
+    A third difference of white noise has the variance 1 + 9 + 9 + 1 = 20 times the noise's.
+    Runs of four equal values and more are left out: an axis at rest, or a coarse encoder between two of its steps,
+    shows no noise. Of a long signal evenly spaced stretches, a million samples in all, will do.
     """
     thirds = np.concatenate([np.diff(w, 3)[_outside_runs(w)] for w in stretches(velocity)])
     least = step / np.sqrt(12.0)
@@ -51,9 +51,9 @@ def stretches(x: NDArray[np.float64], count: int = 64, length: int = 16384) -> l
 def starts_moving(rec: Record, controller: Controller | None) -> bool:
     """Whether the record does not start at rest.
 
-    At rest the first velocity is noise: within six standard deviations of it, or one step of a quantised signal, of zero. In the
-    continuous loop a command at sample 0 passes through at once, so a first velocity between 0 and 0.6 of that command is no
-    motion.
+    At rest the first velocity is noise: within six standard deviations of it, or one step of a quantised signal, of zero.
+    In the continuous loop a command at sample 0 passes through at once,
+    so a first velocity between 0 and 0.6 of that command is no motion.
     A record whose input never changes counts as started at rest by a step at sample 0: with an unknown state before it, the
     record would say nothing about zeros and gain (see `doubtful_start`).
     """

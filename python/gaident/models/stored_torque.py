@@ -1,13 +1,15 @@
 """What the integrator of a controller stored before a record: the torque of a load that was there already, as on a vertical axis.
 
-From rest, the controller makes u_0 of command and velocity. Its integral before the record adds a constant, behind filters too:
-they stood in it. So it is the mean of u - u_0, where that stands out of what else the two are off by:
+From rest, the controller makes u_0 of command and velocity.
+Its integral before the record adds a constant, behind filters too: they stood in it.
+So it is the mean of u - u_0, where that stands out of what else the two are off by:
 
     I(-1) = mean(u - u_0)   where   |I(-1)| > 6 std(u - u_0) and is not to be neglected beside the largest torque
 
-What the velocity did between the lines of a slower log, and the steps of an encoder, add up in the integral of u_0. So
-d = u - u_0 is a level, that before the record, plus a random walk from 0, of steps with the variance q, plus white noise of the
-variance r (local level model; Muth 1960). The mean that knows the level at the first line best has weights that fall from there:
+What the velocity did between the lines of a slower log, and the steps of an encoder, add up in the integral of u_0.
+So d = u - u_0 is a level, that before the record, plus a random walk from 0, of steps with the variance q,
+plus white noise of the variance r (local level model; Muth 1960).
+The mean that knows the level at the first line best has weights that fall from there:
 
     weight of line k ~ (1 - K)^k,   K = (sqrt(s^2 + 4 s) - s)/2,   s = q/r
 

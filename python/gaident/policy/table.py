@@ -13,8 +13,8 @@ Other modules keep numbers that decide nothing and bound no search, each with a 
 
 - "a start": a value from which one fit begins, or the ends of a grid of them; how many there are is effort.
   The bounds and starts of an effect's parameters stand in its row of the library.
-- "of a solver", "the step of a difference", "rounding": what makes an equation's solution exact. A solver ends by its tolerance,
-  and more steps of it change nothing.
+- "of a solver", "the step of a difference", "rounding": what makes an equation's solution exact.
+  A solver ends by its tolerance, and more steps of it change nothing.
 - "memory": the size of a block in which something is read or computed. Any other size gives the same result.
 - "a grid", orders and lags: the models, or frequencies of a test, among which a criterion chooses.
 - Formulas, units, formats of files, what an argument may be, how something is printed or drawn.
@@ -206,12 +206,12 @@ class Decisions:
         SLOWER,
     )
     same_clock: float = loop(
-        0.5, "1", "of the least change from line to line that a faster controller leaves: another's is alike", PERIODS
+        0.5, "1", "of the least error from line to line: two sample times whose errors differ by less are not told apart", PERIODS
     )
     near_age: float = loop(
         0.25,
         "samples",
-        "of a controller, by which the motion's lag misses the age of its velocity at most; T/2 is the age",
+        "of a controller: largest difference between lag and T/2 at which the velocity counts as differenced",
         PERIODS,
     )
     corner_square: float = loop(
@@ -227,7 +227,7 @@ class Decisions:
     each_number: float = loop(
         0.8,
         "1",
-        "of the rms: each number of a form leaves less in a slow log, whose errors are no noise, as a BIC would suppose",
+        "each further number must reduce the rms of a slow log to this share; its errors are no noise, as a BIC supposes",
         SLOWER,
     )
     ahead_seen: float = loop(
@@ -274,9 +274,7 @@ class Decisions:
     wrap_jump: float = reading(0.75, "1", "of a position's range: a jump as long may be a counter that wraps")
     wrap_beside: float = reading(0.25, "1", "of that jump: the steps beside it are shorter")
     wrap_alike: float = reading(0.05, "1", "of that jump, by which the steps before and behind it differ at most")
-    wrap_steady: float = reading(
-        0.5, "1", "of the longer of these two steps: the shorter one is longer, where the motion goes on through a wrap"
-    )
+    wrap_steady: float = reading(0.5, "1", "least ratio of the steps before and after a wrap, the shorter one to the longer one")
     wrap_spared: float = reading(0.999, "1", "of the steps are no jumps then; the rest may be lost samples")
     overlap: float = reading(0.3, "1", "of the shorter of two logs, that both have at least")
     aligned: float = reading(0.5, "1", "correlation of two logs of one motion at least")

@@ -52,8 +52,9 @@ def report(
     Parameters
     ----------
     result : Diagnosis, Identification, or a sequence or mapping of them
-        The result. Of several, before and after a repair or the axes of a machine, the page has an overview, what differs, and
-        what each says; a mapping names them, ``{"before": dia, "after": dia2}``.
+        The result.
+        Of several, before and after a repair or the axes of a machine, the page has an overview, what differs,
+        and what each says; a mapping names them, ``{"before": dia, "after": dia2}``.
     path : str or path-like
         The file to write.
     records : Record or sequence of Record, optional

@@ -124,8 +124,8 @@ def missing_over_velocity(velocity: Vector, dhat: Vector, dt: float, std: float,
 def missing_orders(position: Vector, dhat: Vector, velocity: Vector, axis: str, highest: float | None = None) -> Chart:
     """Lines per turn, on a linear axis per metre, in the missing torque, with the level that chance hardly passes.
 
-    highest: order up to which they are drawn; None: 40 per turn, 200 in the travel of a linear axis. Without a trace where the
-    record travels too little.
+    highest: order up to which they are drawn; None: 40 per turn, 200 in the travel of a linear axis.
+    Without a trace where the record travels too little.
     """
     rotary = axis == "rotary"
     travel = float(np.ptp(position))

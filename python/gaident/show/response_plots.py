@@ -36,8 +36,8 @@ def plot_response(responses: Responses, hz: bool = False, axis: str = "rotary", 
 def response_chart(r: Responses, axis: str, hz: bool = True) -> Chart:
     """Bode diagram of the model against what the record shows by itself, with coherence; over Hz, or rad/s for hz=False.
 
-    Points whose coherence chance could give are left out. Bars are 2 standard deviations of the magnitude and of the phase,
-    1/sqrt(2) of the complex value's each.
+    Points whose coherence chance could give are left out.
+    Bars are 2 standard deviations of the magnitude and of the phase, 1/sqrt(2) of the complex value's each.
     """
     m, s, scale = r.measured, r.simulated, 1.0 if hz else math.tau
     sure = m.coherence > m.threshold

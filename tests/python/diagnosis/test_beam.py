@@ -95,11 +95,11 @@ def test_a_pair_that_only_together_explains_is_found_beside_a_third_that_leads()
     explained = {state(1): 4.0, state(2): 1.5, state(2, 3): 8.0, state(1, 2): -4.0}
     problem = Counting(explained)
     assert problem.beam().run([state()]) == {2, 3}
-    assert problem.asked[:3] == [set(), {1}, {2}], "the best first, and then, as it does not settle, the second"
+    assert problem.asked[:3] == [set(), {1}, {2}], "the best first, and then, as it leaves more than noise, the second"
     assert Counting(explained).beam(width=1).run([state()]) == {1}, "a greedy search stops at the third"
 
 
-def test_where_the_best_settles_no_other_is_grown() -> None:
+def test_where_the_best_leaves_noise_no_other_is_grown() -> None:
     problem = Counting({state(1): 4.0, state(2): 1.5, state(2, 3): 8.0, state(1, 2): -4.0})
     assert problem.beam(leaves_noise=lambda s: s == {1}).run([state()]) == {1}
     assert state(2) not in problem.asked

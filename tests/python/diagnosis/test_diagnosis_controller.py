@@ -25,8 +25,8 @@ LEVELS = np.repeat((60.0, -60.0, 20.0, -40.0, 60.0, -20.0), 120)
 def limited_drive(limit: float, hold: str = "", hum: float = 0.0, step: float = 0.0, seed: int = 0) -> ga.Record:
     """One mass behind a torque limit, noise inside the loop; hold: how the integrator is kept from winding up (text of HOLDS).
 
-    hum: a torque of 37 Hz at the shaft [N m]; step: resolution of the velocity [rad/s]. The controller's
-    equations once more, sample by sample, with the exact step of the mass.
+    hum: a torque of 37 Hz at the shaft [N m]; step: resolution of the velocity [rad/s].
+    The controller's equations once more, sample by sample, with the exact step of the mass.
     """
     rng = np.random.default_rng(seed)
     decay = math.exp(-D / J * DT)

@@ -170,7 +170,7 @@ def test_a_lag_within_a_step_of_the_coarse_grid_is_no_second_mass() -> None:
 
 
 def test_a_gap_in_a_long_record_is_found_in_the_loop_under_any_controller() -> None:
-    """A rattling shaft of 160 Hz behind a current loop, 20 bits differenced: on a coarse grid its torque drives the model astray.
+    """A rattling shaft of 160 Hz behind a current loop, 20 bits differenced: on a coarse grid the errors of the model grow.
 
     The age of the velocity is told once the gap is in the model, and the last valley of the cost is the deepest near by.
     """

@@ -1,7 +1,8 @@
 """Every move of the search by itself, over a toy objective: its models are sums of given signals, and nothing is simulated.
 
-The toy has a predictor of its own. The velocity of a model is the sum of a signal for each base parameter and of a shape for each
-effect, so that the truth is known, and what a fit may find too.
+The toy has a predictor of its own.
+The velocity of a model is the sum of a signal for each base parameter and of a shape for each effect,
+so that the truth is known, and what a fit may find too.
 """
 
 from __future__ import annotations
@@ -598,7 +599,7 @@ def test_elsewhere_looks_for_the_resonance_of_two_masses_beside_their_effects(mo
     (other,) = bench.space.elsewhere(there)
     assert other.parameters.masses == 2 and other.effects == ("a",)
     assert other.x[-1] == pytest.approx(0.4, abs=0.02)
-    assert bench.space.settled(there) is min((there, other), key=bench.space.score)
+    assert bench.space.with_best_resonance(there) is min((there, other), key=bench.space.score)
     without = bench.space.elsewhere(bench.fit(A, GAP))
     assert names(without) == [("a",)], "what may stand for a resonance at the wrong place is left out"
     assert bench.space.elsewhere(bench.fit()) == [] and bench.space.elsewhere(bench.fit(A, masses=1)) == []
@@ -643,27 +644,27 @@ def test_one_mass_with_a_resonance_is_two_masses() -> None:
     assert bench.space.canonical(bench.fit(A)).parameters.masses == 1
 
 
-def test_resettled_puts_the_resonance_into_the_two_masses_alone_and_with_a_simple_effect() -> None:
+def test_as_own_resonance_puts_the_resonance_into_the_two_masses_alone_and_with_a_simple_effect() -> None:
     actuator = toy("c", [(0.5,)], place="actuator")
     bench = Bench({"c": (0.4,)}, masses=2, allowed=(A, actuator, GENERAL, RESONANCE))
-    tries = bench.space.resettled(bench.fit(RESONANCE))
+    tries = bench.space.as_own_resonance(bench.fit(RESONANCE))
     assert names(tries) == [(), ("c",)], "neither at the shaft nor of more than one number"
     assert all(f.parameters.masses == 2 for f in tries)
     assert min(tries, key=bench.space.score).effects == ("c",)
-    assert bench.space.resettled(bench.fit(A)) == [] and bench.space.resettled(bench.fit(RESONANCE, masses=1)) == []
+    assert bench.space.as_own_resonance(bench.fit(A)) == [] and bench.space.as_own_resonance(bench.fit(RESONANCE, masses=1)) == []
 
 
 # The same model again.
 
 
-def test_only_a_resonance_that_leads_is_resettled(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_only_a_resonance_that_leads_becomes_the_mechanisms_own(monkeypatch: pytest.MonkeyPatch) -> None:
     asked: list[tuple[str, ...]] = []
 
-    def resettled(space: moves.Moves, fit: Fit) -> list[Fit]:
+    def as_own_resonance(space: moves.Moves, fit: Fit) -> list[Fit]:
         asked.append(fit.effects)
         return []
 
-    monkeypatch.setattr(moves.Moves, "resettled", resettled)
+    monkeypatch.setattr(moves.Moves, "as_own_resonance", as_own_resonance)
     other = Bench({"a": (0.5,)}, masses=2, allowed=(A, RESONANCE))
     assert {("a",), ("resonance",)} <= set(names(other.space.add(other.fit())))
     resonance = Bench({"resonance": (70.0, 0.3, 40.0, 0.1)}, masses=2, allowed=(A, RESONANCE))

@@ -158,8 +158,9 @@ def test_with_noise_on_the_velocity_alone_both_estimates_agree(colour: float, se
 def test_a_torque_that_is_itself_measured_biases_the_whitened_estimate_and_the_test_says_so(seed: int) -> None:
     """Errors in variables (Soderstrom 2007): e = -G n is slow, and its whitening trusts the fast part, where n outweighs u.
 
-    There the least gain explains n best; the plain error weighs the slow part, where the axis answers to u alone. The power is a
-    matter of the independent samples of the plain error: of 20 such records of 12 s all are above the bound, of 4 s 16.
+    There the least gain explains n best; the plain error weighs the slow part, where the axis answers to u alone.
+    The power is a matter of the independent samples of the plain error:
+    of 20 such records of 12 s all are above the bound, of 4 s 16.
     """
     found = estimated(0.3, seed)
     assert found.plain == pytest.approx(INERTIA, rel=0.05)

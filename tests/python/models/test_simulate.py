@@ -3,8 +3,8 @@
 Agreement: largest deviation over largest response, 1e-9 in double and 1e-4 in float, over every structure
 p, q <= 3 (loops up to order 7), slow clustered roots, roots up to Nyquist, stable and unstable.
 
-Kept apart from errors of the simulator: clamps around an unstable plant can be chaotic. Cases whose response moves
-by more than 300 times a relative change of gain, poles and kp are not drawn: `draw_limited`.
+Kept apart from errors of the simulator: clamps around an unstable plant can be chaotic.
+Cases whose response moves by more than 300 times a relative change of gain, poles and kp are not drawn: `draw_limited`.
 """
 
 from __future__ import annotations

@@ -28,8 +28,9 @@ CORE_ROOMS = [
 ]
 MOST_FILES = 20  # of code in one folder
 
-# Python: the rooms of gaident, lowest first. A module imports its own room and rooms that stand above its line here, inside
-# functions and for type checks too. A room is a folder, without the folders in it that have a line of their own, or one module.
+# Python: the rooms of gaident, lowest first.
+# A module imports its own room and rooms that stand above its line here, inside functions and for type checks too.
+# A room is a folder, without the folders in it that have a line of their own, or one module.
 ROOMS = [
     *("arguments", "messages", "errors", "axis", "version", "files", "checks", "providers", "policy", "_core"),
     "estimation/criterion",  # formulas that every room decides by

@@ -15,12 +15,14 @@ from gaident.policy.declared import EFFORT, SHOWN_BY
 from gaident.policy.table import POLICY, Policy, rows
 from places import PACKAGE, ROOT
 
-# Every room is walked. A number that decides is a row of the policy; another says on its line (or on a line of its own above)
-# why it decides nothing: `# no decision: a start of a fit`.
+# Every room is walked.
+# A number that decides is a row of the policy; another says on its line (or on a line of its own above) why it decides nothing:
+# `# no decision: a start of a fit`.
 MARK = "# no decision: "
-# Numbers with a name in capitals are found wherever a module or class has them. Others stand in no comparison and bound nothing,
-# count no iterations, cut no list, are no default, and no factor of a standard deviation; nor does a local name stand there for
-# them. Free are these, what only guards a division or stands for no limit, and 2 pi; a 2 is a count, a 2.0 is a factor.
+# Numbers with a name in capitals are found wherever a module or class has them.
+# Others stand in no comparison and bound nothing, count no iterations, cut no list, are no default,
+# and no factor of a standard deviation; nor does a local name stand there for them.
+# Free are these, what only guards a division or stands for no limit, and 2 pi; a 2 is a count, a 2.0 is a factor.
 FREE = (-1, 0, 1, 2)
 BOUNDS = {"max", "min", "maximum", "minimum", "clip"}
 STEPS = {"max_nfev", "maxiter", "popsize"}

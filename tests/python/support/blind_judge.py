@@ -1,7 +1,7 @@
 """What a diagnosis said about a blind case, judged: pure functions of the result and the truth.
 
-A finding with no alternatives *names* its effect; one with alternatives *abstains* between them. Findings that only describe the
-record's noise do not count, unless that is what was hidden.
+A finding with no alternatives *names* its effect; one with alternatives *abstains* between them.
+Findings that only describe the record's noise do not count, unless that is what was hidden.
 """
 
 from __future__ import annotations
@@ -16,8 +16,9 @@ from drive_rig import AT_LOAD, OUTSIDE
 
 # Truth -> what no record of command, velocity and torque can tell from it: always reported together.
 EQUIVALENT = {"torque_lag": "velocity_filter", "velocity_filter": "torque_lag"}
-# Members of structural classes: reported, but an exact name is not asked for. A load and dry friction of two levels are the same
-# torque as long as the shaft turns; a load alone, or unequal viscous parts, may be told apart.
+# Members of structural classes: reported, but an exact name is not asked for.
+# A load and dry friction of two levels are the same torque as long as the shaft turns;
+# a load alone, or unequal viscous parts, may be told apart.
 CLASSES = (*EQUIVALENT, "load_torque", "asymmetric_friction")
 # What `driver` may say about an effect outside the library, and what such an effect really contains of the library.
 DRIVERS = {

@@ -338,8 +338,8 @@ def random_truth(
 ) -> Truth:
     """Draw a drive, what hides in it and the commands; the same arguments give the same case.
 
-    `factor` None: log-uniform in 0.5..2, for each effect of a pair its own. Random numbers depend on seed, effect and kind,
-    not on noise or factor, so that curves over the size follow one drive.
+    `factor` None: log-uniform in 0.5..2, for each effect of a pair its own.
+    Random numbers depend on seed, effect and kind, not on noise or factor, so that curves over the size follow one drive.
     """
     effects = (effect,) if isinstance(effect, str) else tuple(effect or ())
     rng = np.random.default_rng([seed, zlib.crc32(" ".join((kind, *effects)).encode())])

@@ -2,8 +2,8 @@
 
 The drive itself is tests/cpp/drive_rig.cpp: continuous time, fourth-order Runge-Kutta steps cut at every event, at least
 40 to a line of the log, dry friction with exact rest, a digital controller, noise inside the loop (what is logged as torque
-follows from what is logged as velocity). It is compiled here when it is first needed. Names and signs of effects are those
-of the library's table; OUTSIDE lists what the library does not know.
+follows from what is logged as velocity). It is compiled here when it is first needed.
+Names and signs of effects are those of the library's table; OUTSIDE lists what the library does not know.
 
     rec = rig(Plant(J=3e-4, D=2e-3, kp=0.03, ki=1.9, dt=1e-3), command, {"coulomb_friction": {"torque": 0.05}}, seed=1)
 

@@ -4,9 +4,9 @@
     I(n) = I(n-1) + ki*dt/2*(e(n) + e(n-1)),  e = r - w        PI, clamped to +-integrator_limit
     u(n) = kp*e(n) + I(n)                                      clamped to +-torque_limit
 
-`exact`  works with polynomials in z, which need many more digits than a double has: 120. The zero-order hold
-         is a power series of the step response. Slow, short, obvious; the referee for all the rest. (Its samples are
-         computed in the standard library's decimals, which are written in C.)
+`exact`  works with polynomials in z, which need many more digits than a double has: 120.
+         The zero-order hold is a power series of the step response. Slow, short, obvious; the referee for all the rest.
+         (Its samples are computed in the standard library's decimals, which are written in C.)
 `scipy_` works in state space: a cascade of sections in normalised time, scipy.signal.cont2discrete (bilinear,
          or the hold by its matrix exponential), the algebraic loop solved for the error, or by a bracketing
          root finder where something may be clamped. Fast enough for long records; good to some 1e-12.
@@ -145,8 +145,8 @@ def taylor_shift(poly: Sequence[Any]) -> list[Any]:
 def _state_in_z(den: Sequence[Any], state: State) -> list[Any]:
     """Observer-form state in z whose free response is that of the observer-form state in delta.
 
-    delta: x_i(n+1) = x_i + x_(i+1) - a_(i+1)*y, y = x_0. Its first p+q outputs fix the state in z,
-    s_k(0) = y(k) + sum_(i=1..k) den_i*y(k-i).
+    delta: x_i(n+1) = x_i + x_(i+1) - a_(i+1)*y, y = x_0.
+    Its first p+q outputs fix the state in z, s_k(0) = y(k) + sum_(i=1..k) den_i*y(k-i).
     """
     a = taylor_shift(den)
     order = len(den) - 1

@@ -3,8 +3,8 @@
 //
 //     dz/dt = v (1 - s0 z sign(v)/Tc),   v = dx/dt
 //
-// (P. R. Dahl, Solid friction damping of mechanical vibrations, AIAA Journal 14, 1976). It is a spring s0 over small motions, and
-// dry friction Tc between motor and load over large ones.
+// (P. R. Dahl, Solid friction damping of mechanical vibrations, AIAA Journal 14, 1976).
+// It is a spring s0 over small motions, and dry friction Tc between motor and load over large ones.
 // z depends on the way of the twist and not on time. Along a way in one direction d = sign(x1 - x0), with a = abs(x1 - x0) s0/Tc,
 //
 //     z1 = z0 + (d - z0 s0/Tc) abs(x1 - x0) (1 - a m),   mean of z: z0 + (d - z0 s0/Tc) abs(x1 - x0) m,   m = (a - 1 + e^-a)/a^2

@@ -1,7 +1,8 @@
 // Drag that grows with the square root of speed, as of a thin film that is sheared: -c sign(w) sqrt(abs(w)), 0 at rest.
 //
-// Its slope c/(2 sqrt(abs(w))) has no bound near w = 0, where no step resolves it. So the substep is implicit and solved exactly:
-// in the direction of motion, with W = (w + w+)/2 the mean velocity and A what it would be without this drag,
+// Its slope c/(2 sqrt(abs(w))) has no bound near w = 0, where no step resolves it.
+// So the substep is implicit and solved exactly: in the direction of motion,
+// with W = (w + w+)/2 the mean velocity and A what it would be without this drag,
 //
 //     W = A - b sqrt(W),   b = beta c/2     ->     sqrt(W) = 2 A/(b + sqrt(b^2 + 4 A)),   0 where A <= 0
 //

@@ -222,9 +222,10 @@ struct KernelSource {
         }
     };
 
-    // How many registers run side by side. One alone waits for its own chain from sample to sample, so none stays alone that need not,
-    // and registers of different orders share a loop of the larger one. Two hide most of that chain, three all of it up to the order
-    // whose states and coefficients fit the registers.
+    // How many registers run side by side.
+    // One alone waits for its own chain from sample to sample, so none stays alone that need not,
+    // and registers of different orders share a loop of the larger one.
+    // Two hide most of that chain, three all of it up to the order whose states and coefficients fit the registers.
     // Where a fused operation is a call of a function, none is spent on the zeros of a smaller order: pairs only, each of one group.
     template <int inputs>
     static constexpr int three_up_to = inputs == 0 ? 4 : 2;

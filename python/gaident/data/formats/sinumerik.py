@@ -9,8 +9,8 @@ and two more public readers take it for:
                   datapointCount="22709" unitsType="velo" .../>
       <rec time="0.004000" f4="-0.000172"/>
 
-A record names the signals that have changed; a signal keeps its value until then, and no record stands where none has. Each
-signal is sampled every `interval` seconds, from the record that names it first.
+A record names the signals that have changed; a signal keeps its value until then, and no record stands where none has.
+Each signal is sampled every `interval` seconds, from the record that names it first.
 
 No unit of length, speed or torque is in the file: what `unitsType` calls "velo" is 1/min for a rotary axis (in that trace the
 slope of the position in degrees is 6 times it), another one for a linear axis. A current is in A.

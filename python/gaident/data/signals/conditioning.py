@@ -79,8 +79,9 @@ def low_pass(x: NDArray[np.float64], dt: float, cutoff_hz: float) -> NDArray[np.
     # no decision: twice the filter's transient
     extension = max(_SHORTEST_EXTENSION, math.ceil(min(2.0 / (cutoff_hz * dt), float(x.size))))
     sections = butter(_ORDER, cutoff_hz * 2.0 * dt, output="sos")
-    # The straight line between the ends passes such a filter as it is. Taken off first, it costs no digits
-    # when the encoder's offset is large, and a record of constant speed stays exact up to its ends.
+    # The straight line between the ends passes such a filter as it is.
+    # Taken off first, it costs no digits when the encoder's offset is large,
+    # and a record of constant speed stays exact up to its ends.
     line = x[0] + (x[-1] - x[0]) / (x.size - 1) * np.arange(x.size)
     smooth = sosfiltfilt(sections, x - line, padlen=min(extension, x.size - 1))
     return np.asarray(smooth + line, dtype=np.float64)

@@ -9,7 +9,7 @@ __all__ = ["backward_difference", "is_backward_difference"]
 
 Vector = NDArray[np.float64]
 
-ROUNDING = 1e-6  # no decision: of the largest velocity, what a quotient of logged numbers is exact to
+VELOCITY_ROUNDING = 1e-6  # no decision: of the largest velocity, what a quotient of logged numbers is exact to
 
 
 def backward_difference(position: Vector, dt: float) -> Vector:
@@ -27,4 +27,4 @@ def is_backward_difference(velocity: Vector, position: Vector | None, dt: float)
     if position is None:
         return False
     off = np.abs(velocity - backward_difference(position, dt))[1:]
-    return float(off.max()) <= ROUNDING * float(np.abs(velocity).max())
+    return float(off.max()) <= VELOCITY_ROUNDING * float(np.abs(velocity).max())

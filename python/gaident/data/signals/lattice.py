@@ -30,10 +30,11 @@ def lattice_step(values: Vector, rounded: bool = False) -> float:
     """The step q of the lattice x = x0 + k q, k whole, that all `values` lie on, in their unit; 0.0 where there is none.
 
     The gaps between neighbouring distinct values are multiples of q; their sum over the sum of the multiples gives q to the
-    accuracy of the numbers. How many steps a wide gap is, only a step shows that is known well enough: it is taken from gaps of
-    up to twice the smallest, then of up to twice as many steps, and so on.
-    rounded: a log may have rounded the values to a part of q. A value on the edge of two decimals may be rounded to either: gaps
-    that are small against the median are within one place.
+    accuracy of the numbers.
+    The number of steps in a wide gap is certain only when q is known well enough.
+    So q is taken from gaps of up to twice the smallest, then of up to twice as many steps, and so on.
+    rounded: a log may have rounded the values to a part of q.
+    A value on the edge of two decimals may be rounded to either: gaps that are small against the median are within one place.
     A signal of fewer than four distinct values has no lattice that could be told from chance.
     """
     distinct = np.unique(values)
@@ -61,10 +62,11 @@ def lattice_step(values: Vector, rounded: bool = False) -> float:
 def encoder_lines(velocity: Vector, period: float, turn: float) -> int:
     """Lines to a turn of the encoder whose angle, differenced over `period` [s], gives these velocities; 0 where none does.
 
-    A difference of counts is a multiple of q = turn/(lines period), `turn` 2 pi rad, or 1 m where velocities are in m/s. The
-    number of lines that q stands for is whole then, and for chance to make it whole is as rare as `whole_lines` says.
-    Decimals of a log leave q less well known than to a line of a fine encoder. Nearly all of these have a power of two of lines:
-    such a number, within the share `binary_lines`, is as rare by chance, and it is taken before a whole number beside it.
+    A difference of counts is a multiple of q = turn/(lines period), `turn` 2 pi rad, or 1 m where velocities are in m/s.
+    The number of lines that q gives is then whole; by chance it is whole as rarely as `whole_lines` says.
+    Of a fine encoder, the decimals of a log do not give q to one line.
+    Nearly all fine encoders have a power of two of lines: such a number, within the share `binary_lines`, is as rare by chance,
+    and it is taken before a whole number beside it.
     A step of 1, 2 or 5 in some decimal place of a unit of speed is a log's rounding: whole rpm each ms would be 60000 lines.
     """
     step = lattice_step(velocity, rounded=True)

@@ -1,4 +1,4 @@
-"""Counters that run over: a position that starts again at the other end of its range, a velocity or torque that turned its sign.
+"""Counters that overflow: a position that starts again at the other end of its range, a velocity or torque of the wrong sign.
 
 A wrap is a step d(n) = x(n+1) - x(n) of nearly the whole range seen so far, between steps p before and after it that are small,
 alike and of the other sign: the motion goes on as if nothing had happened. The counter's range is
@@ -6,9 +6,9 @@ alike and of the other sign: the motion goes on as if nothing had happened. The 
     M = |d| + |p|        p: mean of the steps before and after, in the direction of the motion
 
 to within the difference of the two; where it has a usual range (2^8 .. 2^32, 1, 360, 2 pi, counts per turn, ...), it is that.
-Where the steps beside it differ by more than half or are none, as of an encoder at low speed, a usual range alone is taken.
-A position is continued: x + k M, k the wraps so far. A glitch jumps back at once and is none; nor is a jump of a rotor that takes
-more than a quarter of M in a sample.
+Where the steps beside it differ by more than half or are 0, as of an encoder at low speed, only a usual range counts.
+A position is continued: x + k M, k the wraps so far.
+A glitch, which jumps back at once, is no wrap. Nor is a jump of a rotor that moves by more than a quarter of M in a sample.
 """
 
 from __future__ import annotations

@@ -24,7 +24,7 @@ __all__ = ["as_read", "outliers_of_the_log"]
 Lines = NDArray[np.intp]
 Vector = NDArray[np.float64]
 
-STEP = 1e-6  # no decision: of the highest speed, of a difference
+SPEED_STEP = 1e-6  # no decision: of the highest speed, of a difference
 
 
 def as_read(recorded: Sequence[Record], cleaned: Sequence[Record], controller: Controller | None) -> tuple[Record, ...]:
@@ -77,15 +77,15 @@ def _answered(rec: Record, lines: Lines, cascade: Cascade) -> Record:
 
         torque - made(w) = sum over lines k of x_k d made/d w_k,   w_k + x_k
 
-    Interpolated ones lack the noise that the controller read. Fitted is what changes from line to line: the velocity between the
-    lines, which is lost, adds up in the integral.
+    Interpolated ones lack the noise that the controller read.
+    Fitted is what changes from line to line: the velocity between the lines, which is lost, adds up in the integral.
     """
 
     def made(velocity: Vector) -> Vector:
         return log_of(rec.with_channels(velocity=velocity), len(rec), cascade, True).made(cascade)
 
     w = rec.velocity
-    before, step = made(w), max(noise_std(w), STEP * float(np.abs(w).max()))
+    before, step = made(w), max(noise_std(w), SPEED_STEP * float(np.abs(w).max()))
     columns = np.array([made(w + step * (np.arange(len(w)) == k)) - before for k in lines]).T / step
     assert rec.torque is not None
     x, *_ = np.linalg.lstsq(np.diff(columns, axis=0), np.diff(rec.torque - before), rcond=None)

@@ -1,7 +1,7 @@
 """What the logged torque says of the controller, decided without a plant: gains, limits, effects at its place.
 
-Where the log follows from command and velocity through the controller, nothing of it needs a plant any more. Where it follows
-only with other gains, these are used; where only with a limit, that is a finding.
+Where the logged torque follows from command and velocity through the controller, no plant is needed to explain it.
+Where it follows only with other gains, these are used. Where it follows only with a limit, that limit is a finding.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ SHOWN = {
     "integrator_limit": Text("highest integral that the log shows"),
 }
 """Limits of a PI that a log may show -> what shows them."""
-ROUNDING = 1e-9  # no decision: of the largest torque, what a sum is exact to
+SUM_ROUNDING = 1e-9  # no decision: of the largest torque, what a sum is exact to
 
 
 @dataclass(frozen=True)
@@ -98,8 +98,9 @@ def as_logged(records: Sequence[Record], controller: PI | None) -> AsLogged:
         )
     if all(r.cause == "scale" for r in off):
         either = (
-            " The log does not say whether the gains are wrong or a factor of the {torque} (its unit, a rated {torque}, a {torque} "
-            "constant). If the gains are as given, {inertia}, friction and every other {torque} below are {:.4g} times as large."
+            " The log does not say which is wrong, the gains or a factor of the {torque} (its unit, a rated {torque}, a "
+            "{torque} constant). If the gains are as given, {inertia}, friction and every other {torque} below are {:.4g} times as "
+            "large."
         )
         used = joined("", (used, say(either, controller.kp / kp)))
     shown = replace(controller, kp=kp, ki=ki)
@@ -113,7 +114,7 @@ def _gains_finding(records: Sequence[Record], shown: PI, off: Sequence[Replay]) 
         assert rec.command is not None and rec.torque is not None
         errors.append(rec.command - rec.velocity)
         left.append(rec.torque - pi_torque(rec.command, rec.velocity, rec.dt, shown))
-        floor += len(rec) * max(seen.resolution, ROUNDING * float(np.abs(rec.torque).max())) ** 2
+        floor += len(rec) * max(seen.resolution, SUM_ROUNDING * float(np.abs(rec.torque).max())) ** 2
     before, after = sum(len(r) * r_off.rms**2 for r, r_off in zip(records, off, strict=True)), float(sum(d @ d for d in left))
     integrals = [records[0].dt * np.cumsum(e) for e in errors]
     std = float(np.sqrt(max(after, floor) / n))
@@ -140,7 +141,7 @@ def controller_findings(data: DataSet, scales: Scales) -> tuple[list[Finding], A
     notes = list(dict.fromkeys(texts))
     plain = data.replayed_error({})
     logged = np.concatenate([torque_in(r) for r in data.read])
-    floor = len(plain) * max(max(r.resolution for r in replays), ROUNDING * scales.torque) ** 2
+    floor = len(plain) * max(max(r.resolution for r in replays), SUM_ROUNDING * scales.torque) ** 2
     shown = None if data.pi is None else _limits_shown(off, data.pi)
     if shown is not None:
         return _limit_findings(data, shown, off, plain, floor, notes)

@@ -49,7 +49,7 @@ Matrix = NDArray[np.float64]
 Place: TypeAlias = tuple[str, type[LowPass] | type[Notch]]
 """(argument of `Cascade`, kind of filter)."""
 
-STEP = 1e-5  # no decision: of a filter's number, for a slope
+FILTER_STEP = 1e-5  # no decision: of a filter's number, for a slope
 PLACES: tuple[Place, ...] = (
     ("torque_filters", LowPass),
     ("torque_filters", Notch),
@@ -76,8 +76,9 @@ class Law:
 
     command, velocity: at the controller's samples [rad/s] (n r,); torque: as logged [N m] (n,); used (n,): where no limit acts;
     lengths: lines of each record; period: of the controller [s].
-    Of a log with r = 1 all used lines count alike, and a start of the integrator is one of the numbers. Of a slower one, what is
-    fitted is x(k) - rho x(k-1) of each signal without its mean in each stretch between two limits, see `logged_stretches`.
+    With r = 1 all used lines count alike, and the start of the integrator is fitted.
+    In a slower log each signal x is fitted as x(k) - rho x(k-1), without its mean in each stretch between two limits,
+    see `logged_stretches`.
     velocities: others that have the same lines [rad/s] (n r,) each; () where the log has all samples.
     straight: the velocity straight between its lines [rad/s] (n r,).
     steps: that the velocities of each record are rounded to [rad/s], where r = 1.
@@ -98,7 +99,7 @@ class Law:
 
     @property
     def others(self) -> tuple[Law, ...]:
-        """The same of a slower log with what is not known: the velocity straight between the lines, and no correlation."""
+        """The same of a slower log with the velocity straight between the lines, and without correlation, for the uncertainty."""
         return () if self.straight is None else (replace(self, velocity=self.straight), replace(self, rho=0.0))
 
     def columns(self, places: Sequence[Place], numbers: Vector) -> Matrix:
@@ -137,16 +138,16 @@ class Law:
         return np.array([centred(*whitened(row, stretch, rho), False) for row in rows]).T
 
     def unseen(self, shape: Shape) -> float:
-        """Root mean square of what the velocity may have made of the torque between the lines [N m]; 0 where all are logged.
+        """Root mean square of the torque that the unknown velocity between the lines may make [N m]; 0 where r = 1.
 
-        The proportional part answers on the line itself. Behind a filter it is made of the samples between the lines too.
+        The proportional part depends on the line itself. Behind a filter it also depends on the samples between the lines.
         """
         made = self.columns(shape.places, shape.numbers)
         others = [replace(self, velocity=w).columns(shape.places, shape.numbers) for w in self.velocities]
         return float(np.sqrt(sum(float(np.mean(((made - other) @ shape.coefficients) ** 2)) for other in others)))
 
     def of_other(self, other: Law, coefficients: Vector) -> tuple[Vector, NDArray[np.intp]]:
-        """(what another velocity between the lines makes of the torque [N m], stretch of each line)."""
+        """(the change of the torque by another velocity between the lines [N m], stretch of each line)."""
         assert self.stretch is not None
         none = np.zeros(0)
         off = (replace(self, rho=0.0).columns((), none) - replace(other, rho=0.0).columns((), none)) @ coefficients
@@ -212,9 +213,9 @@ def law_of(records: Sequence[Record], given: PI, every: int = 1, steps: tuple[fl
 def quiet_law(law: Law, memory: int) -> Law | None:
     """The regression in the stretches of small torques, of a log with a line for each of the controller's samples.
 
-    A limit acts at large torques only, wherever it stands: before a filter, whose output shows no plateau, or with an integrator
-    that does not wind up. A stretch begins `memory` lines after the last large torque, when no filter remembers it, and has an
-    integral of its own. It ends before the next one, whose beginning a filter shows late. None where too little is left.
+    A limit acts at large torques only: also a limit before a filter, whose output shows no plateau, or one with an anti-windup.
+    A stretch begins `memory` lines after the last large torque, when its effect in the filters is over, and has its own integral.
+    It ends well before the next large torque, which a filter delays. None where too little is left.
     """
     ahead = memory // 4  # no decision: a filter shows half of a step much sooner than all of it
     parts = []
@@ -228,7 +229,7 @@ def quiet_law(law: Law, memory: int) -> Law | None:
         parts.append(np.where(around, -1, np.cumsum(begins) - 1))
     stretch = numbered(parts)
     quiet = replace(law, used=stretch >= 0, stretch=stretch)
-    several = int(stretch.max(initial=-1)) > 0  # of one alone, other forms come as close
+    several = int(stretch.max(initial=-1)) > 0  # where one record alone is left, other forms fit as well
     return quiet if several and _with_enough(quiet, 0.0) is not None else None
 
 
@@ -353,6 +354,6 @@ def least(M: Matrix, wanted: Vector) -> tuple[Vector, float]:
 
 
 def slope(f: Callable[[Vector], Vector], x: Vector, k: int) -> Vector:
-    step = STEP * max(abs(float(x[k])), 1.0)
+    step = FILTER_STEP * max(abs(float(x[k])), 1.0)
     moved = step * np.eye(len(x))[k]
     return (f(x + moved) - f(x - moved)) / (2.0 * step)

@@ -5,7 +5,7 @@ feedforwards, filters. All forms are compared by one criterion, with n samples, 
 
     n ln(max(rss/n, floor^2)) + k ln n + 2 m ln 3
 
-floor: the root mean square of what the log's rounding makes of a replay, below which nothing is seen.
+floor: the root mean square error of a replay by the rounding of the log; a smaller error shows nothing.
 The least counts, and only if the torque follows from it: `gaident.models.drive_torque.made_by` runs the controller on all
 measured signals.
 """
@@ -64,7 +64,7 @@ Vector = NDArray[np.float64]
 Matrix = NDArray[np.float64]
 
 INSIDE = 1e-9  # no decision: of a bound, where a search starts
-ROUNDING = 1e-9  # no decision: of the largest torque, what a sum is exact to
+SUM_ROUNDING = 1e-9  # no decision: of the largest torque, what a sum is exact to
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,7 +95,7 @@ class Shown:
 
 
 def form_shown(records: Sequence[Record], given: PI, unknown: tuple[str, ...] = (), every: int = 1) -> Shown | None:
-    """The simplest controller that makes the logged torques; None where none does, or the bare PI needs none.
+    """The simplest controller that makes the logged torques; None where none does, or where the given PI makes them.
 
     unknown: gains of `given` that were not given but estimated. every: controller samples to a line of the log.
     """
@@ -108,7 +108,7 @@ def form_shown(records: Sequence[Record], given: PI, unknown: tuple[str, ...] = 
         if found is not None and found.exact:
             return found
         shown.append(found)
-    # What leaves noise under the finest rounding may fit a coarser one, which is not white, with numbers that are not there.
+    # The finest rounding comes first: errors of a coarser rounding are not white, and forms may fit them by numbers too many.
     return next((found for found in reversed(shown) if found is not None), None)
 
 
@@ -129,7 +129,7 @@ def _compared(law: Law, given: PI, floor: float, unknown: tuple[str, ...]) -> li
     followed: int | None = None
     for places in FILTER_SETS if law.every == 1 else FILTER_SETS_OF_ONE:
         if followed is not None and len(places) > followed:
-            break  # what leaves no more than rounding or white noise is not improved by another filter
+            break  # where only rounding or white noise is left, another filter improves nothing
         shape = fitted_shape(law, places, floor)
         least = float(np.hypot(floor, law.unseen(shape)))
         if shape.rms <= POLICY.near_rounding * least or white_noise(shape.left, law.logged):
@@ -149,7 +149,7 @@ def _allowed(records: Sequence[Record], law: Law, controller: PI) -> list[float]
 
 
 def _forms(given: PI, unknown: tuple[str, ...]) -> Iterator[Form]:
-    """Every form; but a rule that other free gains make up for, which no log shows."""
+    """Every form, except integration rules that free gains reproduce exactly: no log shows these."""
     gains: tuple[tuple[str, ...], ...] = ((), ("kp",), ("ki",), ("kp", "ki")) if given.ki else ((), ("kp",))
     gains = tuple(free for free in gains if set(unknown) <= set(free))
     feeds = ((), FEEDS[:1], FEEDS[1:], FEEDS)
@@ -185,7 +185,7 @@ def _candidates(law: Law, shape: Shape, given: PI, floor: float, unknown: tuple[
 
 
 def _price(law: Law, count: int, chosen: int) -> float:
-    """What numbers and settings cost: by the BIC, in a slower log by the share of the error that each has to take away."""
+    """Cost of numbers and settings: that of the BIC; in a slower log, each must reduce the error to the share `each_number`."""
     n = len(law.logged)
     if law.every == 1:
         return cost_of(count, n) + POLICY.form_choice * chosen
@@ -233,9 +233,9 @@ def _shown(records: Sequence[Record], law: Law, given: PI, candidates: Sequence[
 def _shown_slowly(
     records: Sequence[Record], law: Law, given: PI, candidates: Sequence[FormCandidate], floor: float
 ) -> Shown | None:
-    """The same of a log with fewer lines: None where it leaves more than another velocity between them could make."""
+    """The same for a slower log; None where more is left than another velocity between its lines could make."""
     negligible = POLICY.negligible * float(np.abs(law.torque).max())
-    # Where the given controller leaves no more, no other one is looked for; only a setting without a number of its own.
+    # Where the given controller leaves as little, no other numbers are searched, only settings without a number of their own.
     plain = [c for c in candidates if not c.names]
     as_free = [c for c in candidates if plain and c.count == plain[0].count and c.shape is plain[0].shape and not c.form.free]
     for best in (*as_free[:1], *plain[:1], candidates[0]):
@@ -248,7 +248,7 @@ def _shown_slowly(
             if (shown := _with_limit(records, law, given, others, (numbers, filters, cov))) is not None:
                 return shown
             break
-    # Noise on the logged velocity leaves more than interpolation does; with a limit the given controller may explain the whole.
+    # Noise on the logged velocity leaves more than interpolation; with a limit the given controller may explain all of it.
     for best in plain[:1]:
         others = [best, *(c for c in candidates if c is not best)]
         return _with_limit(records, law, given, others, _fitted(law, best, given), float(np.sqrt(POLICY.replay_left)))
@@ -256,7 +256,7 @@ def _shown_slowly(
 
 
 def _shown_quietly(records: Sequence[Record], law: Law, given: PI, floor: float, unknown: tuple[str, ...]) -> Shown | None:
-    """The same where it follows at small torques only: what a limit does, before a filter or with an anti-windup, is no form."""
+    """The same where it follows at small torques only: the comparison uses only samples at which no limit acts."""
     for memory in (POLICY.filter_memory, POLICY.filter_memory // 4):  # no decision: a quarter
         quiet = quiet_law(law, memory)
         candidates = [] if quiet is None else _compared(quiet, given, floor, unknown)
@@ -282,10 +282,10 @@ def _with_limit(
     fitted: tuple[Vector, Vector, Matrix],
     part: float = POLICY.better_reason,
 ) -> Shown | None:
-    """A form that was shown where no limit acts, and the limit; None where there is neither, or the whole torque is no nearer.
+    """A form that was shown where no limit acts, and the limit; None where there is neither, or the whole torque fits no better.
 
-    part: of the given controller's rms error over the whole torque, what is left at most. Of a slower log, whose errors are no
-    noise, it is no more than what one number has to leave, nor than noise of a measured torque.
+    part: of the given controller's rms error over the whole torque, the largest share that may be left.
+    In a slower log, whose errors are no noise, it is also at most `each_number`, and the error at most that of measured noise.
     """
     best, (numbers, filters, cov) = candidates[0], fitted
     at_limit = limited(records, replace(controller_of(best, numbers, filters, given, law.period), period=law.period))
@@ -359,7 +359,7 @@ def _fitted(law: Law, best: FormCandidate, given: PI) -> tuple[Vector, Vector, M
             off, start, bounds=(low, high), x_scale="jac", xtol=1e-14, ftol=1e-14, gtol=1e-15, max_nfev=POLICY.final
         )
         x = found.x if np.sum(found.fun**2) <= np.sum(off(start) ** 2) else start
-    # A weight of exactly 0 was chosen; how well the log shows it is the deviation of a free one.
+    # A weight of exactly 0 was chosen; its deviation is that of a free weight.
     wide = (
         form.constraints(given, len(law.lengths))[1]
         if form.weight != "none"
@@ -371,10 +371,10 @@ def _fitted(law: Law, best: FormCandidate, given: PI) -> tuple[Vector, Vector, M
     J = np.column_stack([table @ B @ wide, slopes])
     sizes = np.linalg.norm(J, axis=0)
     sizes[sizes == 0.0] = 1.0
-    variance = max(float(np.mean((size * off(x)) ** 2)), (ROUNDING * float(np.abs(law.logged).max())) ** 2)
+    variance = max(float(np.mean((size * off(x)) ** 2)), (SUM_ROUNDING * float(np.abs(law.logged).max())) ** 2)
     spread = variance * inverse_of(J.T @ J)
     here = np.linalg.lstsq(J / sizes, law.logged - table @ coefficients, rcond=1e-12)[0] / sizes
-    for other in law.others:  # where the numbers would be by what is not known between the lines
+    for other in law.others:  # how far the numbers move with another velocity between the lines
         columns = other.columns(shape.places, x[m:])
         slopes = _slopes(other, Shape(shape.places, x[m:], coefficients, shape.left))
         table = np.column_stack([columns @ B @ wide, slopes]) / sizes

@@ -24,8 +24,8 @@ LOWEST = 1e-3  # no decision: a start; of the largest value, from where a limit 
 def by_a_limit(records: Sequence[Record], controller: Controller) -> bool:
     """Whether the torque follows with a clamp of the integrator, or a slope of the command, that was not given.
 
-    Then the loop is the drive's but for that, and a simulation of it shows the limit. As in a replay at each sample, it leaves at
-    most `replay_left` of the squared error.
+    Then the loop is the drive's but for that, and a simulation of it shows the limit.
+    As in a replay at each sample, it leaves at most `replay_left` of the squared error.
     """
     return left_by_a_limit(records, controller) ** 2 < POLICY.replay_left * run_error(records, cascade_of(controller)) ** 2
 

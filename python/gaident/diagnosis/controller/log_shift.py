@@ -5,14 +5,15 @@ What the controller issued at a sample follows from what it read there. With its
     u(n) = kp (r(n-a) - w(n-b)) + ki dt sum + I0
 
 shows a and b; what the motion tells of the torque's place is its lag L (estimation/regression/torque_lag.py, [samples], positive
-where the torque stands behind its motion). Of a torque that the log wrote s samples late, in a drive that computes for d_c and
-acts after d_p samples, both not negative,
+where the torque stands behind its motion).
+Of a torque that the log wrote s samples late, in a drive that computes for d_c and acts after d_p samples, both not negative,
 
     b = s + d_c,   L = s - d_p,   therefore   L <= s <= b
 
 A controller that reads the future (b < 0), and a motion before its torque (L > 0), are the log's beyond doubt.
-Where the law holds for b > 0 alone, the log and a delay of the drive are not told apart by it. Moving a commanded torque by b is
-right in either case: a delay of the drive then stands where the model has one, between torque and shaft, and is found there.
+Where the law holds for b > 0 alone, the log and a delay of the drive are not told apart by it.
+Moving a commanded torque by b is right in either case: a delay of the drive then stands where the model has one,
+between torque and shaft, and is found there.
 A measured torque stands behind that delay, and is moved only where L agrees.
 """
 
@@ -118,8 +119,8 @@ def _of_law(rec: Record, controller: PI | None) -> tuple[Mapping[str, int], Text
 def _shift_of_law(rec: Record, controller: PI) -> tuple[int, int]:
     """(a, b): by how many samples command and velocity are older than the log's where the law, its gains free, holds.
 
-    (0, 0) where another shift is not better beyond doubt, or b not sure. Of an undetermined a, as a constant command leaves it,
-    that of the fewest channels.
+    (0, 0) where another shift is not better beyond doubt, or b not sure.
+    Of an undetermined a, as a constant command leaves it, that of the fewest channels.
     """
     assert rec.command is not None and rec.torque is not None
     r, w, u = (x[: POLICY.most_samples] for x in (rec.command, rec.velocity, rec.torque))

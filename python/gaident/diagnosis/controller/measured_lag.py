@@ -5,9 +5,10 @@ first order is, where a line of the log is taken before (d = 1) or after (d = 0)
 
     u_m(n) = a u_m(n-1) + (1 - a) u(n-d) + I0 + noise,   a = exp(-T/tau)
 
-tau is fitted, I0 is what the integrator stored before the record. Compared with this is the same torque without a lag, d samples
-late and with other gains, by the information criterion with the noise of each, on the same lines of the log: none at the torque
-limit, and of each record none of the first, which a log without a lag may lack.
+tau is fitted, I0 is what the integrator stored before the record.
+Compared with this is the same torque without a lag, d samples late and with other gains,
+by the information criterion with the noise of each, on the same lines of the log:
+none at the torque limit, and of each record none of the first, which a log without a lag may lack.
 A torque that is only late has a = 0: a lag is found where a is beyond its deviations, as tau is above 0 whatever the log says,
 and where no whole number of lines by which the torque is late comes near in that criterion.
 Where the lag explains the log no worse, no gains are said to be other, and the torque that the controller makes drives the model:
@@ -40,7 +41,7 @@ Matrix = NDArray[np.float64]
 
 SAMPLES_LATE = (0, 1)  # no decision: the ways in which a log is written
 FASTEST = 0.05  # no decision: samples, the fastest lag that is searched for; no log tells its pole of 2e-9 from 0
-STEP = 1e-4  # no decision: of a lag's pole, for a slope
+POLE_STEP = 1e-4  # no decision: of a lag's pole, for a slope
 NEAR = 1e-3  # no decision: of a range's end, within which a search stands at it
 
 
@@ -84,7 +85,7 @@ def lag_shown(records: Sequence[Record], controller: PI | None) -> Lag | None:
     tau = -dt / float(np.log(a))
     if not FASTEST * (1.0 + NEAR) < tau / dt < POLICY.slowest_lag * (1.0 - NEAR):
         return None
-    step = STEP * (1.0 - a)
+    step = POLE_STEP * (1.0 - a)
     slope = (np.concatenate(_left(parts, a + step, late)) - np.concatenate(left)) / step
     std = float(np.sqrt(power / n / max(float(slope @ slope), 1e-300)))
     if not a > POLICY.check_deviations * std:

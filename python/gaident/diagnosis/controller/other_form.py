@@ -1,7 +1,7 @@
 """The form that the logged torques show of a velocity controller that was given with more than its gains, and is not the drive's.
 
-The search is that of a bare PI with the same gains: what else was given is left out of it. Findings are what differs from the
-given controller.
+The search is that of a bare PI with the same gains: what else was given is left out of it.
+Findings are what differs from the given controller.
 """
 
 from __future__ import annotations

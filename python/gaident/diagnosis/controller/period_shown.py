@@ -13,9 +13,16 @@ A velocity is not old, or T/2 old where it is the difference of an encoder's ang
     lag = 0,   or, on the lattice of an encoder,   lag = -1/(2 r) lines
 
 with the lag of the inverse-dynamics regression (`estimation/regression/torque_lag.py`) under the torque that each controller
-makes between the lines. The nearest r is taken where it is near; where the torque shows one alone, either lag will do, or that
-the torque follows from it. With r = 2 the second lag is also that of a torque held over each line: it shows nothing, and the
-torque has to follow, or to leave no more than `replay_noise` of what one at the log's rate leaves.
+makes between the lines.
+The r whose lag is nearest is taken, on one of these conditions:
+
+- The lag differs by less than `near_age` of the controller's samples.
+  Where the torque leaves one r alone, the lag may be either of the two.
+- The torque leaves one r alone and follows from that controller.
+
+With r = 2 a torque that is held over each line has the second lag too, so that this lag shows nothing.
+The first condition then also asks that the torque follows, or that the controller leaves less than the share `replay_noise`
+of what one at the log's rate leaves.
 """
 
 from __future__ import annotations

@@ -1,7 +1,8 @@
 """A controller that a log of fewer lines shows, run whole on the logged signals: what it does at its torque limit.
 
-The regression of the form leaves out the lines at a limit. What the integrator does there is told by running the controller, with
-each of the schemes that `PI` knows, over the whole record: the scheme with the least squares of what is left of the torque.
+The regression of the form leaves out the lines at a limit.
+What the integrator does there is told by running the controller, with each of the schemes that `PI` knows, over the whole record:
+the scheme with the least squares of what is left of the torque.
 """
 
 from __future__ import annotations
@@ -26,7 +27,7 @@ __all__ = ["Limited", "limited", "run_error", "too_fast"]
 
 Vector = NDArray[np.float64]
 
-ROUNDING = 1e-9  # no decision: of a torque, what a sum is exact to
+SUM_ROUNDING = 1e-9  # no decision: of a torque, what a sum is exact to
 TIMES = np.geomspace(0.3e-3, 0.3, POLICY.tracking_times)  # no decision: a start; s
 
 
@@ -72,7 +73,7 @@ def limited(records: Sequence[Record], controller: Cascade) -> Limited:
     """The controller with the plateau of the logged torques as its limit, and the anti-windup that comes closest.
 
     At a given limit it is the given anti-windup, where none of them comes closer by the share that a number has to take away.
-    Where the torques follow without a limit, as far as their log tells, a plateau of theirs is none: the top of a swing is flat.
+    Where the torques follow without a limit, as well as their log can show, a plateau is no limit: the top of a swing is flat.
     """
     filters_unseen = controller.torque_filters and controller.log_every(records[0].dt) > 1
     given = controller.velocity.torque_limit
@@ -106,13 +107,13 @@ def _spread(records: Sequence[Record], limit: float) -> float:
     torque = np.concatenate([r.torque for r in records if r.torque is not None])
     at_limit = np.abs(torque)[np.abs(torque) >= POLICY.at_limit * limit]
     rounded = rounding_step(torque) / float(np.sqrt(12.0))  # no decision: of an even distribution
-    return max(float(np.std(at_limit)) if len(at_limit) else 0.0, rounded, ROUNDING * limit)
+    return max(float(np.std(at_limit)) if len(at_limit) else 0.0, rounded, SUM_ROUNDING * limit)
 
 
 def _gain(records: Sequence[Record], without: Cascade, controller: Cascade) -> float:
     """BIC units by which a run with a limit is better than one without."""
     n = sum(len(r) for r in records)
-    floor = ROUNDING * float(np.concatenate([np.abs(r.torque) for r in records if r.torque is not None]).max())
+    floor = SUM_ROUNDING * float(np.concatenate([np.abs(r.torque) for r in records if r.torque is not None]).max())
     before, after = (max(run_error(records, one), floor) for one in (without, controller))
     return float(2 * n * np.log(before / after) - np.log(n))
 

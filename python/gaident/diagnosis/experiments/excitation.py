@@ -1,7 +1,7 @@
 """What records excited, and what they therefore cannot judge: "no evidence of X" and "X was never triggered" are two answers.
 
-Figures are of all records together; plain physics only. Whether two effects that were triggered can be told apart is another
-question, which the rival fits answer.
+Figures are of all records together; plain physics only.
+Whether two effects that were triggered can be told apart is another question, which the rival fits answer.
 """
 
 from __future__ import annotations
@@ -220,8 +220,9 @@ def _changes(x: Vector, floor: float) -> int:
 def decided_by_the_angle(records: Sequence[Record]) -> set[str]:
     """Effects that a logged angle says are not there: a late velocity, where it is not late behind the angle.
 
-    Beside a measured torque only. With a commanded one, what acts alike at the actuator would then stand alone, on the word of an
-    angle that the drive may have integrated from the same velocity.
+    Beside a measured torque only.
+    With a commanded one, what acts alike at the actuator would then stand alone,
+    on the word of an angle that the drive may have integrated from the same velocity.
     """
     lags = [velocity_lag(r) if r.torque_is == MEASURED else None for r in records]
     if any(lag is None or abs(lag) > POLICY.lag_said for lag in lags):

@@ -6,8 +6,8 @@ Commands keep to the drive's limits: speed; travel, by integrating the command e
     u = J a       what a ramp of slope a takes; where it ends, the speed overshoots by J a / kp at most
 
 Where kp is known, no jump asks for more than 80 % of the torque, so that nothing shows a saturation, and speeds leave room
-for the overshoot: a third of a jump, and that of the ramps. What is not known, the proposal says. A tenth of speed and travel
-is kept free in any case.
+for the overshoot: a third of a jump, and that of the ramps. What is not known, the proposal says.
+A tenth of speed and travel is kept free in any case.
 """
 
 from __future__ import annotations

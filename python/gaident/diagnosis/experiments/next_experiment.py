@@ -5,13 +5,13 @@ parameters included, as the diagnosis would fit it:
 
     T(A|B) = min over x_B of |v_B|^2 / s^2,   s^2 = V/N,   margin = N ln(1 + T/N)
 
-v whitened by the noise filter of the diagnosed record, V and N of its final fit. A pair's T is the smaller one of both
-directions, as nobody knows which is true; where B contains A only B is simulated, as it can follow anything that A does. The
-command's T is that of its worst pair. Without the fit of the rival every experiment would look good (T-optimal design, Atkinson
-and Fedorov).
+v whitened by the noise filter of the diagnosed record, V and N of its final fit.
+A pair's T is the smaller one of both directions, because it is not known which effect is true.
+Where B contains A only B is simulated, because it can follow any motion of A. The command's T is that of its worst pair.
+Without the fit of the rival every experiment would look good (T-optimal design, Atkinson and Fedorov).
 
-A loop that a position drives gets the path that a command makes. Under what is no bare PI every command is simulated first, and
-made smaller until it asks for no more torque than there is.
+A loop that a position drives gets the path that a command makes.
+Under any controller but a bare PI every command is simulated first, and made smaller until the torque is within its limit.
 """
 
 from __future__ import annotations

@@ -30,11 +30,14 @@ def alternatives_of(
 ) -> list[str]:
     """Names of what these records cannot tell from an effect.
 
-    here: what they cannot tell from it for lack of reversals or of sizes of steps. shown: whether the records show the torque's
-    jump by themselves; then nothing without such a jump stands for it, nor does a controller. offset: what an effect is not the
-    same as. follows: whether the logged torque is what the controller makes, where a log is slower than it. Where it is not, the
-    logged torque drives the model, and is not known between the lines: what that leaves looks like a delay, a filter or a
-    resonance. It does not look like a torque on the shaft that is there from line to line, such as a constant load.
+    here: what they cannot tell from it for lack of reversals or of sizes of steps.
+    shown: whether the records show the torque's jump by themselves; then no effect without such a jump is an alternative, and
+    no controller.
+    offset: what an effect is not the same as.
+    follows: whether the logged torque is what the controller makes, where a log is slower than it.
+    If not, the logged torque drives the model, and is not known between the lines.
+    The error of that looks like a delay, a filter or a resonance.
+    It does not look like a torque on the shaft that is there from line to line, such as a constant load.
     never: equivalents that cannot be in its place with the sizes that were found.
     """
     names = [r.effect for r in rivals if not shown or LIBRARY[r.effect].levels]

@@ -1,13 +1,14 @@
-"""Which values what is left can have bent.
+"""Which values of the mechanism the remaining error can have biased.
 
 With whitened errors v, slopes J of the parameters and C of the free functions of the signal that drives what is left, the
 parameters beside these functions are those of
 
     min |v - J'd - C'c|^2 over d, c
 
-so that a value s'x of the mechanism moves by s'd. It can have been bent where |s'd| is more than its standard deviation, and
-where nothing but the free functions, or they as well as the value, explain the record: then no d is determined along s.
-A ripple of the position, for one, is no function that an inertia could take the place of.
+so that a value s'x of the mechanism moves by s'd.
+It can be biased where |s'd| is more than its standard deviation.
+It can also be biased where the free functions alone explain what the value explains: then no d is determined along s.
+A ripple of the position, for example, does not bias an inertia.
 """
 
 from __future__ import annotations
@@ -27,7 +28,7 @@ from gaident.results.relevance import Relevance
 
 __all__ = ["bent_by", "relevance_of"]
 
-RANK = 1e-6  # no decision: of the largest singular value: less is rounding
+SINGULAR_RANK = 1e-6  # no decision: of the largest singular value: less is rounding
 
 Matrix = NDArray[np.float64]
 
@@ -60,7 +61,7 @@ def _bent_beside(C: Matrix, objective: Objective, fit: Fit, mechanics: Mapping[s
     rows = J[moved] / sizes[moved][:, None]
     rows, rest = rows - (rows @ C.T) @ C, error - (error @ C.T) @ C
     U, values, Vt = np.linalg.svd(rows, full_matrices=False)
-    known = values > RANK
+    known = values > SINGULAR_RANK
     step = np.zeros(len(fit.x))
     step[moved] = -(U[:, known] @ ((Vt[known] @ rest) / values[known])) / sizes[moved]
     base = fit.parameters.base
@@ -71,7 +72,7 @@ def _bent_beside(C: Matrix, objective: Objective, fit: Fit, mechanics: Mapping[s
             continue
         scaled = slope[of_base] / sizes[of_base]
         lost = np.abs(scaled @ U[: len(of_base), ~known]).max(initial=0.0)
-        undetermined = float(lost) > RANK * float(np.abs(scaled).max(initial=0.0))
+        undetermined = float(lost) > SINGULAR_RANK * float(np.abs(scaled).max(initial=0.0))
         if undetermined or abs(float(slope @ step[:base])) > mechanics[name].std:
             found.add(name)
     return found
@@ -97,5 +98,5 @@ def _orthonormal(rows: Matrix) -> Matrix:
     if not len(unit):
         return unit
     _, values, Vt = np.linalg.svd(unit, full_matrices=False)
-    spanned: Matrix = Vt[values > RANK * values[0]]
+    spanned: Matrix = Vt[values > SINGULAR_RANK * values[0]]
     return spanned

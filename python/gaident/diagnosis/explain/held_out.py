@@ -6,8 +6,9 @@ A name rests on the records that were fitted. Data that no parameter has seen sp
     its free run is no better than that of the linear model, and its force error larger than that of the regression.
 
 "Worse", "better" and "larger" are beyond the variation over blocks of the held-out data (95 % of a paired bootstrap): a lower
-error alone decides nothing. "Worse" is also by more than an effect may add to the error (`harm`): of two models that leave
-little more than the noise, one is surely the worse, by less than matters.
+error alone decides nothing.
+"Worse" also means by more than an effect may add to the error (`harm`):
+of two models that leave little more than the noise, a significant difference may be too small to matter.
 A cause that the inverse-dynamics regression contains too, or that these records cannot tell from what it contains, stands:
 a free run may miss where the data cannot show a motion, as speeds that are only held.
 """

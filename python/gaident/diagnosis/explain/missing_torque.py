@@ -4,12 +4,13 @@
     d(n+1) = d(n) + v(n),                var e = noise^2, var v = walk^2 dt
 
 A random-walk torque d rides on the model's input; a Kalman filter and its smoother (fixed interval, de Jong's backward form,
-no covariance is inverted) estimate it from the whole record. Coulomb friction shows as -Tc sign(w), a load T as -T. No
-derivative is taken, resonances are undone correctly, and what the sensor's noise hides stays within `std`.
+no covariance is inverted) estimate it from the whole record.
+Coulomb friction shows as -Tc sign(w), a load T as -T. No derivative is taken, resonances are undone correctly,
+and what the sensor's noise hides stays within `std`.
 
 The gains are the steady ones, so that the recursions are linear ones of constant coefficients; the initial state is the
-one that makes the innovations smallest. The plant is discretised as the loop says: by zero-order hold, or bilinearly for
-loop="continuous".
+one that makes the innovations smallest.
+The plant is discretised as the loop says: by zero-order hold, or bilinearly for loop="continuous".
 """
 
 from __future__ import annotations

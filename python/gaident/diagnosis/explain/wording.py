@@ -74,9 +74,9 @@ def basis_of(found: Selection) -> list[Text]:
 
 
 def closest(effects: Sequence[str], driver: str | None, named: bool) -> Text:
-    """What effects say that come closest and are no causes; driver: what the error that they leave depends on, if it shows.
+    """Note on effects that fit best but are not named; driver: what the error that they leave depends on, if it shows.
 
-    named: whether other causes are.
+    named: whether other causes are named.
     """
     on = "" if driver is None else say(" that depends on {}", called(driver))
     if named:
@@ -87,7 +87,7 @@ def closest(effects: Sequence[str], driver: str | None, named: bool) -> Text:
 
 
 def far_off(ratio: float) -> Text:
-    """What a free run says that misses the velocity by `ratio` times its noise."""
+    """Note on a free run that misses the velocity by `ratio` times its noise."""
     text = (
         "The free run misses the velocity by {:.0f} times its noise. In these data that passes for a {torque} disturbance, but "
         "is far too large for noise: a controller or a limit that is not the one given here, or a load that changes in time."
@@ -96,7 +96,7 @@ def far_off(ratio: float) -> Text:
 
 
 def hidden_by_torque_noise(floor: float) -> Text:
-    """What the noise of a measured torque makes of the free run: an rms error [rad/s] in which smaller effects do not show."""
+    """Note on the rms error [rad/s] that the noise of a measured torque makes in the free run: smaller effects do not show."""
     text = (
         "The noise of the measured {torque} by itself lets a free run miss the velocity by about {:.2g} {rad/s}: "
         "an effect that moves it by much less does not show in these data."
@@ -105,7 +105,7 @@ def hidden_by_torque_noise(floor: float) -> Text:
 
 
 def drives_itself(damping: Estimate) -> Text:
-    """What a negative viscous friction says."""
+    """Note on a negative viscous friction."""
     text = (
         "The viscous friction comes out negative ({:.2g} {N m s/rad}), which no axis has: friction that falls with the speed or "
         "does not depend on it, or a lag, is in its place. {Inertia} and friction are not to be trusted."
@@ -114,7 +114,7 @@ def drives_itself(damping: Estimate) -> Text:
 
 
 def torque_unlogged(data: DataSet) -> list[Text]:
-    """What stays open where the gains alone say which torque drove the motor."""
+    """Note on records without a torque: the given gains alone say which torque drove the motor."""
     if data.controller is None or any(r.torque is not None for r in data.read):
         return []
     text = (
@@ -125,7 +125,7 @@ def torque_unlogged(data: DataSet) -> list[Text]:
 
 
 def period_seen(data: DataSet) -> list[Text]:
-    """What is said where nobody gave the pitch of a linear axis and the records show one."""
+    """Note on a pitch of a linear axis that was not given and that the records show."""
     if not data.period_seen or data.period is None:
         return []
     text = (
@@ -136,13 +136,13 @@ def period_seen(data: DataSet) -> list[Text]:
 
 
 def or_other_gains(effect: str) -> Text:
-    """What is said of a finding in whose place other gains would explain as much."""
+    """Note on a finding where other gains would explain as much."""
     text = "Other gains than the given ones would explain these records as well as the {}: log the {torque}, it shows the gains."
     return say(text, called_of(effect))
 
 
 def or_other_form(words: Text) -> Text:
-    """What is said where another form of controller comes closer, but does not explain the records either.
+    """Note on another form of controller that comes closer, but does not explain the records either.
 
     words: what that controller has.
     """
@@ -155,7 +155,7 @@ def or_other_form(words: Text) -> Text:
 
 
 def closer_numbers(torque: FoundNumbers, model: FoundNumbers) -> Text:
-    """What is said where the model of the axis moved the numbers of the controller that its torque had shown."""
+    """Note on numbers of the controller that the torque had shown and that the model of the axis changed."""
     if torque.covariance is None:  # no torque is logged
         return Text(
             "The model of the axis with its causes shows the controller's numbers closer than the one without: they were moved."

@@ -25,8 +25,8 @@ OF_THE_TORQUE = frozenset({"torque"})
 class Cause(Term):
     """One effect that a diagnosis can name: its row of the library.
 
-    needs: conditions of the records, most general first; each says why it is not met, or None. Without one of them the records
-    say nothing about the effect.
+    needs: conditions of the records, most general first; each says why it is not met, or None.
+    Without one of them the records say nothing about the effect.
     unseen: which sizes of the effect could not have shown in the records; None where every size would.
     excited_by: names of the commands of the menu of experiments that excite it and tell it from others.
     alike: what records may lack -> the kinds that the effect then belongs to; effects of one kind are the same there.

@@ -20,8 +20,8 @@ class Composition:
     """One effect, `whole`, that is the same torque as several others together but for parameters which these do not have.
 
     parts: parameters of the whole -> parameters of each of the others, one of which is a constant torque.
-    lowest: (level of dry friction, constant torque) [N m] -> the lowest level that the whole would have in their place. No
-    friction has one below 0, which would drive the axis.
+    lowest: (level of dry friction, constant torque) [N m] -> the lowest level that the whole would have in their place.
+    No friction has one below 0, which would drive the axis.
     different: what to say where the others leave the model worse: {} the constant torque fitted with them [N m], {} BIC units by
     which the model is worse, {} the constant torque of `parts` [N m].
     """

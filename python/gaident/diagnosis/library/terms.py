@@ -78,8 +78,8 @@ def conditional_classes(reversals: int, step_sizes: int, torque_logged: bool) ->
 def of_inverse_dynamics(values: Mapping[str, float]) -> dict[Cause, dict[str, float]]:
     """The effects that the parameters of an inverse-dynamics regression stand for, each with its own parameters.
 
-    values: name -> value, as `gaident.InverseDynamics.parameters` has them. Viscous friction common to both directions belongs to
-    the mechanism and is none.
+    values: name -> value, as `gaident.InverseDynamics.parameters` has them.
+    Viscous friction common to both directions belongs to the mechanism and is no effect.
     """
     read = ((row, row.regressed(values)) for row in LIBRARY.values() if row.regressed is not None)
     return {row: own for row, own in read if own is not None}

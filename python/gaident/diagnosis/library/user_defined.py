@@ -18,7 +18,7 @@ __all__ = ["Library"]
 
 Matrix = NDArray[np.float64]
 
-STEP = 0.05  # no decision: of the range between the bounds: what makes a difference
+STEP_OF_RANGE = 0.05  # no decision: of the range between the bounds: what makes a difference
 
 
 class Library(Mapping[str, Cause]):
@@ -79,7 +79,7 @@ def _term(row: Row) -> Cause:
     count = next(n for n in range(POLICY.own_values, 0, -1) if n ** len(row.parameters) <= POLICY.own_starts or n == 1)
     axes = [[along(i, v) for v in starts(p, count)] for i, p in enumerate(row.parameters)]
     rows = list(itertools.islice(itertools.product(*axes), POLICY.own_starts))
-    steps = tuple(1.0 if p.logarithmic else STEP * (p.highest - p.lowest) for p in row.parameters)
+    steps = tuple(1.0 if p.logarithmic else STEP_OF_RANGE * (p.highest - p.lowest) for p in row.parameters)
 
     return Cause(
         row.name,

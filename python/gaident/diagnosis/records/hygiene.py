@@ -37,8 +37,9 @@ def outliers(velocity: Vector, error: Vector | None = None) -> NDArray[np.intp]:
     """Samples of the sensor that leave the signal and come back at once.
 
     Such a sample exceeds its neighbours by far more than is usual, and the lines through the samples on either side miss it by
-    as much, in the same direction. A corner, an impact or the end of a delay lies on the line from one side; from a round top
-    both lines lead beyond it. What a model follows, its `error` not leaving as well, is none.
+    as much, in the same direction.
+    A corner, an impact or the end of a delay lies on the line from one side; from a round top both lines lead beyond it.
+    A sample is no outlier where the model follows it, so that the `error` does not jump too.
     """
     w, e = velocity.copy(), None if error is None else error.copy()
     hit = np.zeros(0, dtype=np.intp)

@@ -1,9 +1,10 @@
 """Attribution: is a finding a cause, or does it only describe what the library does not contain?
 
-A finding is withdrawn where a free function of one signal in its place explains more, and where what is left, in the finding's
-own domain, is of the finding's size.
-But whitened gains judge by what is fast, and in a record with almost no noise a small misfit of the true cause is as significant
-as the cause itself. So a finding stands where it leaves next to nothing of the free-run error that there is to explain.
+A finding is withdrawn where a free function of one signal in its place explains more, and where the remaining error, in the
+finding's own domain, is of the finding's size.
+But whitened gains depend on the fast part of the errors.
+In a record with almost no noise a small misfit of the true cause is then as significant as the cause itself.
+So a finding stands where it explains nearly all of the free-run error that a function of the driver can explain.
 With V the sum of squared raw errors, all linear parts refitted: without the finding, with it, and with any function of the
 driver beside it,
 
@@ -12,13 +13,14 @@ driver beside it,
 Measured: square-root drag 0.77 to 0.87 by whatever friction comes closest, friction that varies with the angle 0.44 to 0.71; the
 friction of a real ball-screw axis (EMPS) 0.997, beside a remainder that is significant all the same.
 
-That share asks whether the finding is all there is. An axis may have the cause and something else as large that is not in the
-library: a joint whose friction has a part that grows with gravity's torque has dry friction, though it explains 0.45 of what a
-function of the position does. So dry friction also stands where the records show it without any model of the rest: the torque
-jumps at the reversals, beside the steepest drag, or the axis rests while its torque changes
-(`estimation/regression/reversal.py`). It is then a cause, and what is left remains named by its driver.
-The same says where there is none: a drag sqrt(w) is explained to 0.95 by dry friction where the motion is fast, but its torque
-does not jump.
+That share asks whether the finding is all there is.
+An axis may have the cause and something else as large that is not in the library: a joint whose friction has a part that grows
+with gravity's torque has dry friction, though it explains 0.45 of what a function of the position does.
+So dry friction also stands where the records show it without any model of the rest: the torque jumps at the reversals,
+beside the steepest drag, or the axis rests while its torque changes (`estimation/regression/reversal.py`).
+It is then a cause, and what is left remains named by its driver.
+The records also show where there is no dry friction: it explains a drag sqrt(w) to 0.95 where the motion is fast, but that
+torque does not jump.
 """
 
 from __future__ import annotations
@@ -48,9 +50,12 @@ __all__ = ["friction_shown", "only_describes", "share", "shown_by_the_records", 
 def what_is_left(space: Moves, final: Fit) -> tuple[bool, Dependence]:
     """(whether a model leaves noise, what its error depends on).
 
-    The variance-ratio test knows the velocity's noise alone. Behind a measured torque it is noise where no driver explains more
-    beside a noise model of that torque than in records without effects, and where the free run misses no more than both noises
-    make of it: a noise model takes a load that changes in time for noise, and its error is far larger than that.
+    The variance-ratio test knows the velocity's noise alone.
+    Under a measured torque two other conditions show noise:
+
+    - Beside a noise model of the torque no driver explains more than in records without effects.
+    - The free-run error is no larger than both noises make it.
+      A noise model also describes a load that changes in time, but the free-run error of that is far larger.
     """
     if not space.data.torque_measured:
         return space.is_noise(final), dependence(space.objective, final)
@@ -85,8 +90,8 @@ def only_describes(
 def shown_by_the_records(space: Moves, final: Fit, effect: str) -> bool | None:
     """Whether the records show dry friction of the finding's level by themselves; None where they say nothing.
 
-    False where they show that there is none: the torque hardly jumps at the reversals. Of other effects they say nothing that no
-    function of the driver could be.
+    False where they show that there is none: the torque hardly jumps at the reversals.
+    Other effects are not tested: a function of the driver could show the same.
     """
     parameters = final.parameters
     if not parameters.term(effect).levels or not space.data.torque_logged:
@@ -102,8 +107,8 @@ def shown_by_the_records(space: Moves, final: Fit, effect: str) -> bool | None:
 def friction_shown(data: DataSet, model: Model, axis: InverseDynamics | None = None) -> bool:
     """Whether the records show dry friction without any simulation: at the reversals, at rest, or by the regressed axis.
 
-    Where no record turns back, and none rests, the torque that does not fall with the speed is that friction, or in one direction
-    a load that no record tells from it.
+    Where no record turns back or rests, the part of the torque that does not depend on the speed counts as dry friction.
+    In one direction no record can tell a load from it.
     """
     if not data.torque_logged:
         return False
@@ -117,7 +122,7 @@ def friction_shown(data: DataSet, model: Model, axis: InverseDynamics | None = N
 def _friction_in(data: DataSet, model: Model) -> tuple[Estimate | None, Estimate | None]:
     """(jump of the torque at the reversals, torque held at rest), below what resonates in the model.
 
-    A small torque held at rest is none: a controller at rest also answers to small torques that disturb the axis.
+    A small torque held at rest does not count: a controller at rest also answers to small torques that disturb the axis.
     """
     cutoff = band_of(model, data.records, below=POLICY.rigid_band)
     rest = torque_held_at_rest(data.records, cutoff)
@@ -133,7 +138,7 @@ def _sure(jump: Estimate | None, rest: Estimate | None, least: float) -> bool:
 
 
 def simplified(space: Moves, final: Fit, left: Dependence) -> Fit:
-    """A generalisation back to the simpler effect, where as much is left as the detail explains: it describes the rest."""
+    """A generalisation as the simpler effect again, where the error left is as large as what its detail explains."""
     driver = left.driver
     if driver is None:
         return final

@@ -42,7 +42,7 @@ class Task:
     """One selection on its grid of time.
 
     most: effects in a model at most; shown: families of effects that the records show by themselves; rigid_below: the records
-    show one rigid body there [rad/s], and two masses that swing more slowly are none.
+    show one rigid body below it [rad/s], so that two masses with a slower resonance are no shaft.
     """
 
     objective: Objective
@@ -71,7 +71,7 @@ class Task:
         return _by_output_errors(self)
 
     def predictor(self) -> Predictor:
-        """Of linear models: the closed loop only where no torque is available."""
+        """The predictor of linear models: the closed loop only where no torque is available."""
         return ClosedLoop(self.data) if self.data.loop_only else OpenLoop(self.data)
 
     def start(self, model: Model, iterations: int = POLICY.long) -> Fit:
@@ -155,10 +155,10 @@ def noise_floor(task: Task, one: Fit) -> float:
     floor = beyond(float(np.mean(objective.error(one)[used] ** 2)))
     if not np.isfinite(floor):
         return 0.0
-    if floor > 0.0 and data.fits_in_loop:  # what the loop suppresses is no noise either: without it a load is integrated
+    if floor > 0.0 and data.fits_in_loop:  # the error in the loop bounds it too: in the open loop a load is integrated
         inside = np.concatenate([r.velocity - simulate(task.model, r, data.loop) for r in data.records])
         floor = min(floor, beyond(float(np.mean(inside[used] ** 2))))
-    if floor > 0.0:  # a shaft that resonates is no misfit
+    if floor > 0.0:  # the error of one mass on a drive with a resonant shaft is no noise
         fits = [f for part in task.two_masses(one) for f in part if swings(f)]
         floor = min([floor, *(beyond(f.cost / objective.count) for f in fits)])
     return floor
@@ -181,7 +181,7 @@ class ByOutputErrors:
     def informed(self, samples: float) -> Task:
         """The task of a search: so many independent samples, and what the records show by themselves.
 
-        Both are found out here, since the specification test, which is made of most records, needs neither.
+        Both are computed here only: the specification test, which most records need, uses neither.
         """
         task, family = self.task, self.objective.family
         assert isinstance(family, OutputErrors)
@@ -192,7 +192,7 @@ class ByOutputErrors:
     def regressed(self, predictor: Predictor) -> Fit | None:
         """The regressed axis, fitted by output errors; None where there is none.
 
-        The regression needs no start: where a simulation has valleys, as with gravity, it says where to begin.
+        The regression needs no start values. It gives them to a fit whose cost has several minima, as with gravity.
         """
         if self.axis is None:
             return None
@@ -269,8 +269,8 @@ def _axis(data: DataSet) -> InverseDynamics | None:
 def heaviest(data: DataSet, fit: Fit) -> float | None:
     """The inertia [kg m^2] from which a model counts as heavier than an axis that is regressed with its own terms.
 
-    A regression that contains gravity, a load or a spring which is not in the model is that of another axis, and its inertia is
-    another one. None where no such regression shows an inertia beyond its deviations.
+    The regression has only the terms of the model: another term, such as gravity, a load or a spring, changes the inertia.
+    None where that regression shows no inertia beyond its deviations.
     """
     axis = _axis(data)
     if axis is None:
@@ -288,7 +288,7 @@ def heaviest(data: DataSet, fit: Fit) -> float | None:
 
 
 def _contains(fit: Fit, term: str, turns_back: bool) -> bool:
-    """Whether a model contains what a term of the regression stands for; friction of either form counts as the same.
+    """Whether a model contains the effect of a term of the regression; equivalent forms of friction count as the same.
 
     turns_back: whether the regression contains dry friction, which it cannot tell from a constant torque in one direction.
     """

@@ -1,8 +1,9 @@
 """A beam search over a graph of models.
 
-A model is grown by moves that add, and reduced by moves that drop or replace. Each has a score, the lower the better, which
-counts what every effect costs; so that all moves are decided by the same comparison. The best few models are carried on side by
-side: of two causes at once, either one alone may explain less than some third does.
+A model is grown by moves that add, and reduced by moves that drop or replace.
+Each model has a score, the lower the better, which contains a penalty for every effect.
+So all moves are decided by the same comparison.
+The search continues with the best few models: of two causes at once, each alone may explain less than a third effect does.
 
 This file knows neither effects nor records: its tests run it on a counting problem.
 """
@@ -50,8 +51,8 @@ class Beam(Generic[State]):
     def run(self, starts: Sequence[State]) -> State:
         """The model that the search ends with.
 
-        The best model is grown until nothing that it grows to is worth it. Where it does not leave noise, the others of the beam
-        are grown then: one of them may lead further.
+        The best model is grown until nothing that it grows to is worth it.
+        Where it does not leave noise, the others of the beam are grown then: one of them may lead further.
         """
         beam = self._best(starts)
         grown: set[Hashable] = set()

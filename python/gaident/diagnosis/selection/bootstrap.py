@@ -1,8 +1,9 @@
 """Parametric bootstrap of the whole first step: how large does the best gain become where there is no effect?
 
 Records are made from the fitted linear mechanism and the noise that the extended model leaves (a filter, driven by the whitened
-residual drawn anew); screening, fits and filters run as on the real record. The filter is the model's own or, where output errors
-count, an autoregression of what it leaves: these errors are slow, and white ones would contain more information than they do.
+residual drawn anew); screening, fits and filters run as on the real record.
+The filter is the model's own or, where output errors count, an autoregression of what it leaves:
+these errors are slow, and white ones would contain more information than they do.
 Candidates, searches over orders and starts, bounds and colour are thereby all accounted for.
 
     p = (1 + number of gains as large as the observed one) / (B + 1)

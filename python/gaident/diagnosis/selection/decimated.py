@@ -5,9 +5,9 @@ Every k-th velocity is kept, and the torque is the mean of what was held in betw
     W(m) = w(m k),   U(m) = 1/k sum_i u(m k + i),   i = 0 .. k-1
     W(m+1) - W(m) = k dt/J U(m)   for w(n+1) - w(n) = dt/J u(n)
 
-The velocity is not smoothed: a reversal would look like an elastic one, and no friction jumps there any more. What is found on
-the coarse grid is a start: every figure of the result comes from all samples, and so does the search for what the grid cannot
-show.
+The velocity is not smoothed: a reversal would look like an elastic one, and no friction jumps there any more.
+What is found on the coarse grid is a start: every figure of the result comes from all samples,
+and so does the search for what the grid cannot show.
 """
 
 from __future__ import annotations
@@ -50,8 +50,8 @@ def decimated_objective(objective: Objective, blocks: int) -> Objective:
 def blocks_of(data: DataSet, error: Vector) -> int:
     """Samples of the log in one of the coarse grid: as many as leave enough samples and keep what the error shows; 1 for none.
 
-    error: of a linear model, records one after the other. A controller that is simulated cannot be coarsened: it samples as it
-    does.
+    error: of a linear model, records one after the other.
+    A controller that is simulated cannot be coarsened: it samples as it does.
     """
     if data.slower or (data.pi is not None and not data.torque_logged):
         return 1

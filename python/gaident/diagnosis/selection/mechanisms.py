@@ -1,7 +1,7 @@
 """The linear mechanism that effects are added to: one mass or two, starts for both, and how one becomes the other.
 
-Lags, delays and filters are linear too, and an identification absorbs them in poles and zeros of no mechanical meaning. A
-diagnosis starts from the mechanism, so that they can be told by name.
+Lags, delays and filters are linear too, and an identification absorbs them in poles and zeros of no mechanical meaning.
+A diagnosis starts from the mechanism, so that they can be told by name.
 """
 
 from __future__ import annotations
@@ -133,8 +133,8 @@ def _without(roots: Sequence[complex], left_out: Sequence[complex]) -> list[comp
 def reduced(identified: Model) -> list[Model]:
     """Two-mass starts: each resonance of the identified model with each of its antiresonances.
 
-    A lag or a delay adds roots of its own to those of the mechanism, which stand between them. With p, z one pair each and a the
-    slowest real pole, K |z|^2/(a |p|^2) is the identified model's gain at standstill.
+    A lag or a delay adds roots of its own to those of the mechanism, which stand between them.
+    With p, z one pair each and a the slowest real pole, K |z|^2/(a |p|^2) is the identified model's gain at standstill.
     """
     slow = rigid(identified)
     poles, zeros = ([r for r in roots if r.imag > 0.0] for roots in (identified.poles, identified.zeros))
@@ -154,8 +154,9 @@ def resonant(objective: Objective, one: Fit) -> list[Model]:
 def on_a_shaft(objective: Objective, one: Fit, known: float = 0.0) -> list[tuple[Hypothesis, Vector]]:
     """A fit of one mass with its effects, as two masses: the resonances that help it most, on a fine grid.
 
-    What delays the torque moves the resonance that fits best, and the cost has a valley at each: with it in the model the
-    resonance is looked for where it is. Not within a step of the grid from a known one [rad/s], whose valley has been searched.
+    An effect that delays the torque moves the resonance that fits best, and the cost has a local minimum at each resonance.
+    So the resonance is searched again beside the effect.
+    Resonances within a step of the grid from a known one [rad/s] are left out: they lead to the same minimum.
     """
     poles, z = _shaft_frequencies(one), SHAFT_DAMPING
     rows = np.array([(np.log(w), z, np.log(w * r), z) for w in poles for r in SHAFT_RATIOS])
@@ -246,7 +247,7 @@ def evenly_damped(parameters: Parameterisation, x: Vector) -> Vector:
         e1 = a + D_G (1/J_M + 1/J_L),   f1 = a + D_G/J_L,   f0/e0 = J_M/(J_M + J_L)
 
     A linear fit of a shaft with a gap damps the zeros instead, as if bearings of the load braked and those of the motor drove it.
-    A gap put into such a mechanism makes it no better, whatever its width; in a passive one the cost has one broad valley.
+    A gap added to such a mechanism does not lower the cost; in a passive mechanism the cost has one wide minimum.
     """
     _, a, e1, e0, _, f0 = parameters.base_values(x[None, :])[0]
     if not 0.0 < f0 < e0:
@@ -259,8 +260,8 @@ def evenly_damped(parameters: Parameterisation, x: Vector) -> Vector:
 def is_mechanism(parameters: Parameterisation, x: Vector) -> bool:
     """Whether two masses are two masses on a shaft: sum of pairwise A = K_G (1/J_M + 1/J_L) is above prod B = K_G/J_L.
 
-    A spring to the ground has a positive stiffness. A resonance swings: one that is damped as much as its bounds allow is a lag
-    or another filter, which two poles and two zeros imitate.
+    A spring to the ground has a positive stiffness.
+    A resonance whose damping is at its bound is no shaft: a lag or another filter looks like two poles and two zeros.
     """
     for t in parameters.terms:
         if t.resonates:

@@ -4,8 +4,8 @@ A fuller model is *worth* its effects where its score
 
     BIC + penalty per effect (a generalisation counts as two, a second mass as one)
 
-is lower than the simpler model's, both under the same predictors, and where what it explains is material. This is the one
-decision of the search; its numbers stand in the policy.
+is lower than the simpler model's, both under the same predictors, and where what it explains is material.
+This is the one decision of the search; its numbers stand in the policy.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ def words(effects: Iterable[str]) -> str:
 
 
 def representative(term: Term) -> str:
-    """Of effects that are the same to every record and have as many parameters, the first."""
+    """Of effects that no record tells apart and that have as many parameters, the first."""
     alike = (n for n in equivalents(term.name) if LIBRARY[n].size == term.size)
     return min((*alike, term.name))
 
@@ -86,9 +86,10 @@ class ModelSpace:
         return self.policy.rival_margin * (1.0 + short)
 
     def swings(self, fit: Fit) -> bool:
-        """Whether two masses may be a shaft: damped as one, not where the records show one rigid body, nor faster than they show.
+        """Whether two masses may be a shaft: damped like one, and neither too slow nor too fast for what the records show.
 
-        One mass may be. What is faster than the samples of the controller show stands for another fast effect.
+        One mass has no such bounds. Below `rigid_below` the records show one rigid body.
+        A resonance faster than the controller's samples show replaces another fast effect.
         """
         line = fit.parameters.scales.dt / fit.parameters.scales.blocks  # of the log, also on a coarse grid
         every = 1 if self.data.controller is None else self.data.controller.log_every(line)
@@ -96,8 +97,8 @@ class ModelSpace:
         return swings(fit) and (fit.parameters.masses == 1 or self.rigid_below <= resonance(fit) < seen)
 
     def score(self, fit: Fit) -> float:
-        """BIC and what the effects cost; the lower the better."""
-        # The penalty is for the number of candidates tried: what the records show by themselves was not found by trying.
+        """BIC and the penalties of the effects; the lower the better."""
+        # The penalty is for the number of candidates tried: an effect that the records show without a model costs one less.
         effects = sum(_depth(t) - (t.family in self.shown) for t in fit.parameters.terms)
         searched = sum(t.search_cost for t in fit.parameters.terms)
         more = fit.parameters.masses - 1 + fit.parameters.on_a_spring  # a second mass, or a spring, counts as an effect
@@ -112,9 +113,9 @@ class ModelSpace:
         return float(np.sqrt(fit.cost / self.objective.count)) / max(self.noise_beside(fit), 1e-300)
 
     def noise_beside(self, fit: Fit) -> float:
-        """Standard deviation of white noise on the velocity, as it shows where a fit is known [rad/s].
+        """Standard deviation of white noise on the velocity, as a fit shows it [rad/s].
 
-        In a log slower than its controller the motion itself has third differences; what a fit leaves of it has less of them.
+        In a log slower than its controller the motion itself has third differences; the errors of a fit have smaller ones.
         """
         return self.data.noise_of(self.objective.error(fit))
 
@@ -129,8 +130,9 @@ class ModelSpace:
     def small_unwhitened(self, fit: Fit) -> bool:
         """Whether the errors before whitening, in the loop where there is one, are little more than the noise.
 
-        A loop that begins under a load hides it from a model that has none: the torque drives that one. Where the torque of each
-        sample is known, it is enough that it leaves so little by itself: a loop lacks what the controller answered to noise.
+        A loop that begins under a load is only simulated for a model that has the load.
+        Where the torque of each sample is known, small errors under that torque are enough:
+        the simulated loop lacks what the controller answered to noise.
         """
         loaded = self.data.simulates_loop and any(LIBRARY[e].constant for e in fit.effects)
         in_loop = self.data.fits_in_loop or loaded
@@ -157,13 +159,12 @@ class ModelSpace:
         return min((fit, self.predicted_by(fit, other.predictor)), key=lambda f: f.bic)
 
     def material(self, simpler: Fit, fuller: Fit) -> bool:
-        """Whether a model explains a fair part of what a simpler one leaves beyond the noise, or leaves noise.
+        """Whether a model explains more than a set share of what a simpler one leaves beyond the noise, or leaves noise.
 
         Significance is not enough where a model is wrong: many effects then reduce the error a little.
-        The part counts whitened, or before whitening: a noise filter may take the larger misfit for noise and
-        whiten it.
-        Beside impacts the part is larger: one impact more or less leaves an error even with the true parameters, which other
-        effects can fit.
+        The share of either the whitened or the unwhitened errors is enough: a noise filter may whiten the larger misfit.
+        Beside impacts the share is larger: one impact too many leaves an error even with the true parameters.
+        Other effects can fit that error.
         """
         impacts = any(t.impacts for t in simpler.parameters.terms)
         if self.quiet(fuller) and not impacts:
@@ -176,13 +177,14 @@ class ModelSpace:
         return before - after > share * (before - noise)
 
     def hidden(self, whitened: Fit, other: Fit) -> bool:
-        """Whether whitening hides a cause that another model contains: it has passed for noise.
+        """Whether whitening hides a cause that another model contains, because the noise filter described it.
 
-        The two are different models, of which no specification test says anything. Both are fitted to the errors before
-        whitening, under the same predictor. There the model without the cause leaves more than noise; the other one leaves at
-        most the share `overrules` of that, and is better by as much as tells two explanations apart. What that is worth is
-        counted in independent samples: those of the space of output errors, else those in the errors of the model without the
-        cause.
+        The two models are different, so that the specification test does not apply.
+        Both are fitted to the errors before whitening, under the same predictor.
+        There the model without the cause leaves more than noise; the other one leaves at most the share `overrules` of that,
+        and its score is better by the margin of two explanations.
+        The score counts independent samples: those of the space of output errors,
+        else those in the errors of the model without the cause.
         """
         if not set(other.effects) - set(whitened.effects):
             return False
@@ -197,13 +199,13 @@ class ModelSpace:
         return space.score(beside) < space.score(without) - space.margin
 
     def of_output_errors(self, samples: float = np.inf) -> ModelSpace:
-        """The same models under errors that are not whitened, so many of them independent; this space where they are not."""
+        """The same models under output errors, with so many independent samples; this space where it does not whiten."""
         if not self.whitens:
             return self
         return replace(self, objective=self.objective.under(OutputErrors(samples)))
 
     def unwhitened_cost(self, fit: Fit) -> float:
-        """Sum of squared errors before whitening, refitted to these, in the loop where it is the drive's."""
+        """Sum of squared errors before whitening, of the model refitted to these; in the loop where it is the drive's."""
         return self.unwhitened(fit, self.free_predictor(fit)).cost
 
     def unwhitened(self, fit: Fit, predictor: Predictor) -> Fit:
@@ -211,7 +213,7 @@ class ModelSpace:
         return ls.fit(self.objective, fit.hypothesis.driven_by(predictor), fit.x, WHITE, self.policy.usual)
 
     def free_predictor(self, fit: Fit) -> Predictor:
-        """What leaves a model to itself: the loop where it is the drive's, else the torque that drives the model."""
+        """The predictor of the free run: the loop where it is that of the drive, else the torque that drives the model."""
         return self.closed(fit.predictor) if self.data.left_in_loop else fit.predictor
 
     def in_both_loops(self, simpler: Fit, fuller: Fit) -> bool:
@@ -266,20 +268,20 @@ class ModelSpace:
         return ls.reestimated(self.objective, ls.fit(self.objective, hypothesis, x, WHITE, iterations))
 
     def continued(self, hypothesis: Hypothesis, fit: Fit, x: Vector, iterations: int = POLICY.usual) -> Fit:
-        """From x under the noise model of a fit that it was made of, then under its own."""
+        """Least squares from x under the noise model of the fit that x was made of, then under a noise model of its own."""
         return ls.reestimated(self.objective, ls.fit(self.objective, hypothesis, x, fit.noise, iterations))
 
     def finished(self, fit: Fit) -> Fit:
-        """A short fit taken to the end, under the predictors that may say more."""
+        """A short fit continued to the end, under the best of the predictors that may suit it."""
         return self.under_best_predictor(self.completed(fit))
 
     def completed(self, fit: Fit) -> Fit:
-        """A short fit taken to the end under its own noise model."""
+        """A short fit continued to the end under its own noise model."""
         fit = fit if fit.converged else ls.fit(self.objective, fit.hypothesis, fit.x, fit.noise, self.policy.usual)
         return ls.reestimated(self.objective, fit)
 
     def under_best_predictor(self, fit: Fit) -> Fit:
-        """A fit under the predictor, of those that may say more, that says most."""
+        """A fit under the predictor with the lowest BIC, of those that may suit it."""
         predictors: list[Predictor] = []
         if fit.predictor.closed and self.whitens and not self.data.loop_only:
             # Parameters found in closed loop may be a good start for the open loop, whose errors show more.
@@ -315,7 +317,7 @@ class ModelSpace:
     def deepened(self, fit: Fit) -> Fit:
         """A model with impacts, searched globally nearby until that brings no more.
 
-        Each impact more or less is a valley of the cost, also where the errors are as small as the noise that the velocity shows.
+        The cost has a local minimum for each number of impacts, also where the errors are as small as the noise of the velocity.
         """
         if not any(t.impacts for t in fit.parameters.terms):
             return fit

@@ -8,14 +8,14 @@ A model is a mechanism (one mass or two) with effects. The moves are
     exchange    an effect for one of its equivalence class, where only others tell them apart
     other side  a shaft effect of two masses at the other end of the shaft
     a load      one mass with effects of its shaft as two masses, these at the load
-    resettle    the mechanism's resonance at the place of an extra one
+    own         the mechanism's resonance at the place of an extra one
     ground      one mass on a spring to the ground
     demote      two masses to one, or the spring away
     close       the open loop to the closed one
     search      the same model again, from all starts and globally, beside stops and impacts
     elsewhere   two masses with the same effects, with another resonance
 
-Whether an effect is added is one decision, `ModelSpace.worth`; a search of the same model goes by its BIC alone.
+Whether an effect is added is one decision, `ModelSpace.worth`; a search of the same model compares its BIC alone.
 """
 
 from __future__ import annotations
@@ -94,7 +94,7 @@ class Moves(SideMoves):
         return self.objective.once(key, lambda: self._best(now, [*self.ground(now), *self.with_a_load(now), *self._add(now)]))
 
     def known(self, fit: Fit) -> Fit:
-        """A fit of the same model that was grown already, where it is no worse by what swaps a place: its growth is known."""
+        """A fit of the same model that was grown already, unless it is worse by more than `swap`: what it grows to is known."""
         near = [f for f in self._grown(fit) if f.bic < fit.bic + self.policy.swap]
         return min(near, key=lambda f: f.bic) if near else fit
 
@@ -122,7 +122,7 @@ class Moves(SideMoves):
             return []
         rankings = [test.ranked(WHITE), test.ranked(None)] if self.whitens else [test.ranked(WHITE)]
         if self.whitens and self.quiet(now):
-            # Where nothing but noise is left the linearised gains are near enough: only what promises something is fitted.
+            # Where only noise is left the linearised gains are accurate enough: only effects with a promising one are fitted.
             rankings = [[s for s in ranking if s.hope > self.policy.hope * self.penalty] for ranking in rankings]
             if not any(rankings):
                 return self._best(now, fits)
@@ -130,9 +130,8 @@ class Moves(SideMoves):
         short: dict[Term, Fit] = {}
         for ranking in rankings:
             for s in better_sides([s for s in ranking if s.term not in done])[: self.policy.screened]:
-                for x in s.starts[
-                    : len(s.starts) if s.term.resonates else self.policy.starts_each
-                ]:  # a valley at every frequency
+                # Of a resonance the cost has a local minimum at each frequency: it is fitted from all its starts.
+                for x in s.starts if s.term.resonates else s.starts[: self.policy.starts_each]:
                     fit = ls.scored(self.objective, ls.fit(self.objective, s.hypothesis, x, s.noise, self.policy.glance))
                     if s.term not in short or fit.bic < short[s.term].bic:
                         short[s.term] = fit
@@ -142,16 +141,18 @@ class Moves(SideMoves):
         reach = self.policy.beam_reach * self.penalty
         fits += [self.under_best_predictor(f) if self.score(f) < self.score(best[0]) + reach else f for f in best]
         if fits:
-            fits += self.resettled(min(fits, key=self.score))
+            fits += self.as_own_resonance(min(fits, key=self.score))
             fits += self.at_the_load(now, fits)
         return self._best(now, fits)
 
     def _promising(self, now: Fit, test: ScoreTest, short: Collection[Fit]) -> list[Fit]:
-        """Of short fits beside a model that leaves noise those that are worth a whole one.
+        """Of short fits beside a model that leaves noise those that are fitted to the end.
 
-        Before whitening anything fits coloured noise. So they are compared with this model itself, fitted before whitening too,
-        each under the filter of what it leaves. A fit may not have come near; what promises something under the noise of this
-        model, or of what nothing explains, goes on as well.
+        Before whitening any effect can fit coloured noise.
+        So they are compared with this model, fitted before whitening too, each under the filter of its own errors.
+        A short fit may have stopped too early.
+        So an effect with a promising linearised gain is fitted to the end too.
+        Its gain is taken under the noise of this model, or under that of the error that no effect explains.
         """
         plain = ls.scored(self.objective, ls.fit(self.objective, now.hypothesis, now.x, WHITE, self.policy.usual))
         found, others = [f for f in short if f.bic < plain.bic], [f for f in short if not f.bic < plain.bic]
@@ -164,7 +165,7 @@ class Moves(SideMoves):
     def _best(self, now: Fit, fits: Sequence[Fit]) -> list[Fit]:
         """Those that are mechanisms, best first, in the loop where the best one is.
 
-        A second mass that an effect has become swings on a shaft: what does not describes some other thing.
+        A second mass that took the place of an effect has to swing on its shaft; one that does not describes something else.
         """
         fits = [f for f in fits if f.parameters.masses == now.parameters.masses or self.swings(f)]
         found = sorted((f for f in fits if f.cost < WORST and is_mechanism(f.parameters, f.x)), key=self.score)
@@ -177,7 +178,7 @@ class Moves(SideMoves):
     def _generalisations(self, test: ScoreTest, now: Fit, source: Fit, simple: Term) -> None:
         """The rest of a family in the place of one of its members, at its level and at one that its own fit may have missed.
 
-        now: the model that candidates extend; source: the fit with the member, the same one where it is there already.
+        now: the model that candidates extend; source: the fit with the member, which may be the same fit.
         """
         parameters = source.parameters.without(simple.name)
         x = source.parameters.removed(source.x, simple.name)
@@ -186,7 +187,7 @@ class Moves(SideMoves):
         level = abs(float(source.x[source.parameters.slot(simple.name)][0]))
         torque = parameters.scales.torque
         turning = [t for t in wanted if t.harmonic]
-        if turning:  # what of the simple one changes with the angle is linear, and stands beside it
+        if turning:  # the part of the simple effect that changes with the angle is linear, and is added to it
             test.replace(source, simple.name, Hypothesis(parameters, source.predictor), x, turning)
             wanted = [t for t in wanted if not t.harmonic]
         for friction in {max(level, LEAST * torque), max(level, MISSED * torque)}:
@@ -198,7 +199,7 @@ class Moves(SideMoves):
                 test.add(bare, x, wanted)
 
     def ground(self, fit: Fit) -> list[Fit]:
-        """One mass with its effects, on a spring to the ground; none where a spring promises too little.
+        """One mass with its effects, on a spring to the ground; none where the linear test gives a spring too little.
 
         Its stiffness is that of a linear test, a torque -k theta beside the model and a constant, or of the momentum's balance.
         """
@@ -224,12 +225,12 @@ class Moves(SideMoves):
         fits = [self.refitted(h, x, self.policy.long) for h, x in starts]
         return [f for f in fits if f.cost < WORST and is_mechanism(f.parameters, f.x)]
 
-    def resettled(self, fit: Fit) -> list[Fit]:
+    def as_own_resonance(self, fit: Fit) -> list[Fit]:
         """The two masses with the resonance that was found as their own, alone or with a simple effect beside it.
 
         What delays the torque or blocks the shaft biases the resonance of two masses so far that a local fit does not return.
         The true one is then found as an extra resonance, which explains more than any other effect.
-        Of the effects beside it the few best short fits are fitted to the end: they begin at the resonance already.
+        Of the effects beside it the few best short fits are fitted to the end: their starts have the resonance already.
         """
         if fit.parameters.masses == 1 or not fit.parameters.terms[-1:] or not fit.parameters.terms[-1].resonates:
             return []
@@ -261,7 +262,7 @@ class Moves(SideMoves):
     def without(self, fit: Fit, effect: str) -> Fit:
         """The model refitted without one of its effects; beside stops and impacts after a search of its own.
 
-        What depended on its torque becomes the simplest that it contains.
+        Effects that depended on its torque become the simplest effect that they contain.
         """
         hypothesis, x = fit.hypothesis.without(effect), fit.parameters.removed(fit.x, effect)
         for term in [t for t in hypothesis.parameters.terms if not t.stands_with(hypothesis.effects)]:
@@ -272,7 +273,7 @@ class Moves(SideMoves):
         return less
 
     def simplify(self, fit: Fit) -> list[Fit]:
-        """Each generalisation as what it contains, at its level."""
+        """Each generalisation replaced by an effect that it contains, at its level."""
         return [
             self.as_nested(fit, t, LIBRARY[name]) for t in fit.parameters.terms for name in t.nested if self.may(LIBRARY[name])
         ]
@@ -290,7 +291,7 @@ class Moves(SideMoves):
         return self.demoted(fit) if fit.effects else []
 
     def demoted(self, fit: Fit) -> list[Fit]:
-        """Two masses with their effects, or with none, as one mass with these, where none acts on the shaft or is another one."""
+        """Two masses as one mass with the same effects; none where an effect acts on the shaft or is an extra resonance."""
         if fit.parameters.masses == 1 or any(t.needs_two_masses or t.resonates for t in fit.parameters.terms):
             return []
         hypothesis, x = as_one_mass(fit)
@@ -309,7 +310,7 @@ class Moves(SideMoves):
     def exchange(self, fit: Fit) -> list[Fit]:
         """An effect as one of its equivalence class, where something else turns with an angle that was not logged.
 
-        Alone they are the same. But the angle of a filtered velocity is late, and so is not what a ripple turns with.
+        Alone they are the same. But the angle of a filtered velocity is late, and a ripple depends on the true angle.
         """
         if self.data.angle_logged or not any(t.harmonic for t in fit.parameters.terms):
             return []
@@ -341,19 +342,19 @@ class Moves(SideMoves):
             fit = min((fit, self.restarted(fit, term)), key=lambda f: f.bic)
             if term.multimodal and not self.quiet(fit):
                 fit = min((fit, self.evolved(fit)), key=lambda f: f.bic)
-        return self.settled(fit)
+        return self.with_best_resonance(fit)
 
-    def settled(self, fit: Fit) -> Fit:
+    def with_best_resonance(self, fit: Fit) -> Fit:
         """The fit or, where these score better, two masses with another resonance.
 
-        A fit at the wrong resonance may leave little: a noise filter takes the ringing that it misses for noise.
+        A fit at the wrong resonance may leave small errors: its noise filter treats the ringing that it misses as noise.
         """
         return min((fit, *self.elsewhere(fit)), key=self.score)
 
     def elsewhere(self, fit: Fit) -> list[Fit]:
-        """Two masses with the same effects, their resonance looked for beside these: that of the fit was found before them.
+        """Two masses with the same effects, their resonance searched again: that of the fit was found before the effects.
 
-        What stands for a resonance at the wrong place, another resonance or an effect of the shaft, is left out.
+        An extra resonance or an effect of the shaft is left out: it may replace a resonance at the wrong place.
         """
         bare, x = fit.hypothesis, fit.x
         for t in fit.parameters.terms:
@@ -369,7 +370,7 @@ class Moves(SideMoves):
         return [] if best is None else [self.refitted(best.hypothesis, best.x, self.policy.long)]
 
     def restarted(self, fit: Fit, term: Term) -> Fit:
-        """The best fit from an effect's starts, with the rest as it stands: the first began far from the rest's final values."""
+        """The best fit from an effect's starts beside the present rest: its first fit began beside other values of the rest."""
         rows = term.starts(fit.parameters.scales)
         if not rows:
             return fit

@@ -5,8 +5,8 @@
     two levels, two viscous parts:  -(Tp + bp w) or (Tn + bn |w|)     not the same
 
 At either end of an elastic shaft; a constant torque is the same at both.
-A load that is fitted to the last of these stands for the mean of (bp - bn) |w| / 2 over the motion. Where it leaves the model
-worse, there is no choice between the two, and the offset is mostly what it stood for.
+A load that is fitted to the last of these has the value of the mean of (bp - bn) |w| / 2 over the motion.
+Where it leaves the model worse, there is no choice between the two, and the offset is mostly what it stood for.
 """
 
 from __future__ import annotations

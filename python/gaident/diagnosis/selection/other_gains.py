@@ -4,8 +4,9 @@ Without a logged torque a model is driven by what the given PI makes of command 
 
     e = r - w,   u = kp (e + ki/kp int e dt),   w_model = G(u)
 
-A common factor of kp and ki is one of u: inertia and torques of the model take it, and no record shows it. The ratio ki/kp does
-show, and wrong it leaves errors of the command's shape, or looks like mechanics. Of a PI with limits, kp itself shows too.
+A common factor of kp and ki scales u; inertia and torques of the model scale with it, and no record shows it.
+The ratio ki/kp does show: a wrong one leaves errors of the command's shape, or looks like mechanics.
+With limits in the PI the record also shows kp itself.
 
 The hypothesis is a model with some of the selected effects under a PI with
 
@@ -24,7 +25,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gaident.axis import Text, joined, say, unit_text
-from gaident.control.found import STEP, FoundNumbers
+from gaident.control.found import NUMBER_STEP, FoundNumbers
 from gaident.control.pi import PI
 from gaident.diagnosis.selection.moves import Moves
 from gaident.diagnosis.selection.select import Selection
@@ -204,7 +205,7 @@ class _Search:
         z, found = end
         stds = self.under.deviations(objective, found, z)
         pi = self.controller(z)
-        at_end = np.abs(z) > (1.0 - STEP) * self.reach
+        at_end = np.abs(z) > (1.0 - NUMBER_STEP) * self.reach
         rows = [("ki", pi.ki, "N m/rad"), ("kp", pi.kp, "N m s/rad")][: self.freedom]
         estimates = {
             name: Estimate(value, value * float(std), unit, bool(end))

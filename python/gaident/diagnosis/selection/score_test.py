@@ -1,18 +1,19 @@
 """The score test: which effects are worth a fit.
 
-Each one's starts are simulated once, and what the present model could absorb is taken out.
+The starts of each effect are simulated once, and the part that the present model could explain is projected out.
 
 With v the whitened error of the present model, v_c that of a start row and P the projection beyond the present model's
 sensitivities,
 
     d = P (v_c - v),   V_c = min over t of |P v + t d|^2,
 
-the cost after a linearised refit of everything else and of the size of the change. Harmonics of the angle need no grid: their two
-components are linear, order by order. So are those of a resonance in series with the mechanism, frequency by frequency,
+the cost after a linearised refit of everything else and of the size of the change.
+Harmonics of the angle need no grid: their two components are linear, order by order.
+So are those of a resonance in series with the mechanism, frequency by frequency,
 
     (s^2 + 2 zz wz s + wz^2)/(s^2 + 2 zp wp s + wp^2) = 1 + (c1 wp s + c0 wp^2)/(s^2 + 2 zp wp s + wp^2)
 
-on the model's velocity, as long as it changes little: the frequencies where they help most become starts beside the given ones.
+on the model's velocity, as long as it changes little: the frequencies with the largest gain become starts beside the given ones.
 """
 
 from __future__ import annotations
@@ -50,8 +51,8 @@ FURTHEST = 2.0  # no decision: times the way to a start, where the next one stan
 class Screened:
     """One candidate: its hypothesis, start vectors from the best on, the filter that it was judged with.
 
-    fall: what the best start promises against the model that it extends, under this filter; hope: the same against that model
-    under the filter of its own errors, in which the effect may pass for noise.
+    fall: fall of the BIC that the best start promises against the model that it extends, under this filter.
+    hope: the same against that model under the filter of its own errors, which may describe the effect as noise.
     """
 
     term: Term
@@ -67,7 +68,7 @@ class _Trial:
     term: Term
     hypothesis: Hypothesis
     rows: Matrix  # start coordinates; of harmonics one for each order, without their two components
-    errors: Matrix  # raw errors; for harmonics the two columns of each order, what the error loses per unit
+    errors: Matrix  # raw errors; for harmonics two columns of each order, the decrease of the error per unit
     base: _Base
     onto: tuple[Hypothesis, Vector]  # the model and its x that the coordinates are added to
     columns: bool
@@ -113,7 +114,7 @@ class ScoreTest:
         """Candidates as extensions of the model x."""
         valleys = [t for t in terms if t.multimodal]
         if valleys and self.data.fits_in_loop and not hypothesis.predictor.closed:
-            # A replayed torque that ignores a limit of the controller has biased the mechanism; the closed loop has not.
+            # A replayed torque that ignores a limit of the controller biases the mechanism; the closed loop does not.
             inside = hypothesis.driven_by(ClosedLoop(self.data, hypothesis.predictor.own_angle))
             start = x if self.data.torque_logged else ls.fit(self.objective, inside, x, WHITE, POLICY.usual).x
             self.add(inside, start, valleys)
@@ -168,15 +169,17 @@ class ScoreTest:
             self.trials.append(_Trial(term, longer, rows, self.objective.errors(longer, X), base, onto, False))
 
     def _columns(self, hypothesis: Hypothesis, x: Vector, term: Term, error: Vector) -> tuple[Vector, Matrix]:
-        """(orders, columns): what the raw error loses per unit of the two components, pairs of rows per order."""
+        """(orders, columns): decrease of the raw error per unit of the two components, a pair of rows per order."""
         end = LoadEnd.of(hypothesis.parameters, x, self.data) if term.at_load else None
         angle = self.data.angle if end is None else end.angle(self.data.angle)
         first, last = term.orders
         per_period = TURN / (self.data.period or TURN)  # 1 but on a linear axis, whose orders count in its pitch
         orders = np.arange(float(first if per_period == 1.0 else 1), last + 1.0) * per_period
-        # Seen is what passes a few times, slowly enough for the sampling at the speeds that matter: there and back counts twice.
-        # Of the first order most of a period has to be there, of the others some: a curve of another kind over part of a turn is
-        # a wave of one order or another. A single order once per turn is gravity, which a sixth of a turn shows.
+        # An order is seen where its period passes a few times, slowly enough for the sampling at the usual speed.
+        # Motion there and back counts twice.
+        # Of the first order most of a period must be covered.
+        # Of a higher one two periods must be: over part of a turn a curve of any kind is a wave of one order or another.
+        # A single order once per turn is gravity, which a sixth of a turn shows.
         turned, path = float(np.ptp(angle)), float(np.abs(np.diff(angle)).sum())
         per_sample = float(np.median(np.abs(self.objective.measured)) + 1e-12) * self.data.dt
         travelled = np.where(orders > per_period, POLICY.seen_periods, POLICY.seen_turn) * TURN
@@ -200,7 +203,7 @@ class ScoreTest:
         return orders, np.stack([w * waves.real, -w * waves.imag], axis=1).reshape(-1, len(angle))
 
     def _narrow(self, rows: Matrix, base: _Base) -> Matrix:
-        """Resonances between those of some start rows that lower the error most, before whitening and beside noise of its own."""
+        """Resonances between those of the start rows that lower the error most, without and with the noise filter of the base."""
         poles = np.exp(np.linspace(rows[:, 0].min(), rows[:, 0].max(), POLICY.resonances))
         columns, own = self._resonating(poles, base), self.objective.noise_of(base.error, base.hypothesis.predictor.closed)
         found = []
@@ -215,7 +218,7 @@ class ScoreTest:
         return np.array(found)
 
     def _resonating(self, poles: Vector, base: _Base) -> Matrix:
-        """What the raw error loses per unit of c1 and c0 of a resonance at each of some frequencies [rad/s], pairs of rows.
+        """Decrease of the raw error per unit of c1 and c0 of a resonance at each frequency [rad/s]; pairs of rows.
 
         Bilinear transformation, exact at wp: s = k (1 - z^-1)/(1 + z^-1), k = wp/tan(wp dt/2).
         """
@@ -232,7 +235,7 @@ class ScoreTest:
         return np.array(columns)
 
     def filter_beyond(self, base: _Base) -> NoiseFilter:
-        """Noise filter of what nothing in the library explains, to first order: no effect is whitened away as noise."""
+        """Noise filter of the error that no effect of the library explains, to first order: it whitens no effect as noise."""
         directions = [base.J]
         rest = project_out(base.J, base.error[None, :])[0]
         for t in (t for t in self.trials if t.base is base):
@@ -248,10 +251,11 @@ class ScoreTest:
         return self.objective.noise_of(project_out(D, base.error[None, :])[0], base.hypothesis.predictor.closed)
 
     def ranked(self, noise: NoiseFilter | None) -> list[Screened]:
-        """Candidates from the most to the least promising, each beside the base where it does better.
+        """Candidates from the most to the least promising, each with the base where it gains more.
 
-        What counts is the fall of a candidate's cost against the base that it extends, under the same filter: a model in its loop
-        leaves another error than one that the torque drives. noise: the filter; None: each base's own of what nothing explains.
+        Candidates are ranked by the fall of the cost against the base that they extend, under the same filter:
+        a model in its loop leaves another error than one that the torque drives.
+        noise: the filter; None: for each base that of the error that no effect explains.
         """
         best: dict[Term, Screened] = {}
         for t in self.trials:
@@ -325,7 +329,7 @@ def _harmonics(angle: Vector, orders: Vector) -> NDArray[np.complex128]:
 
 
 def _along(D: Matrix, rest: Vector, proportional: bool = False) -> Vector:
-    """|rest|^2 after the best step forward along each row of D: as far as the next start, further where all is proportional."""
+    """|rest|^2 after the best step along each row of D: at most to the next start, unbounded where the effect is proportional."""
     sizes = np.maximum(np.einsum("ij,ij->i", D, D), 1e-300)
     slopes = D @ rest
     steps = np.clip(-slopes / sizes, 0.0, np.inf if proportional else FURTHEST)

@@ -1,13 +1,12 @@
 """The selection of a model: mechanism, effects, and what could stand in their place.
 
     1. The search under innovations, each hypothesis whitened by a noise model of its own.
-    2. Where more than noise is left, or the free run of the loop is missed: the same search under output errors. What it finds
-       is fitted under innovations as well, and counts there if it is better.
-       Only this search where the torque itself was measured: noise on the input, which no noise model of the output describes.
-    3. Whitened errors decide where they leave noise (variance ratio) and where the estimates of whitened and of output errors of
-       the selected model do not contradict each other (specification test). Else its errors are no stationary noise, and the
-       model that output errors select is the result, with the information of its independent samples.
-    4. The same is the result where it contains a cause that the whitened errors hide: two models, compared before whitening.
+    2. Where more than noise is left, or the free run of the loop is missed: the same search under output errors.
+       What it finds is also fitted under innovations, and counts there if it is better.
+       Only this search is made where the torque was measured: no noise model of the output describes noise of the input.
+    3. Whitened errors decide where they leave noise (variance ratio) and pass the specification test of the selected model.
+       Else its errors are no stationary noise. The result is then what output errors select, counted in independent samples.
+    4. That model is also the result where it contains a cause that whitening hides: both models are compared before whitening.
     5. The rivals of every effect.
 
 Long records are searched on a coarser grid of time first.
@@ -62,10 +61,9 @@ class Selection:
     def estimated(self) -> tuple[Objective, Fit]:
         """What the parameters of the selected model are estimated under, and the model with them.
 
-        Output errors weighed as torques show a cause best. But a torque that the model lacks biases the inertia there: the slope
-        of its error is the smaller, the heavier the axis. So the velocity is nearly all of the error that is minimised
-        (`velocity_part`), and the torque the rest. Of a measured torque an inertia is free up to that of the regression with the
-        terms of this model, and not of those that the records suggest before anything is selected.
+        Output errors weighed as torques show a cause best, but a torque that the model lacks biases the inertia there.
+        So the minimised error is nearly all velocity (`velocity_part`), and torque for the rest.
+        Where the torque was measured, the inertia is at most that of the regression with the terms of this model.
         """
         objective, final = self.space.objective, self.final
         family = objective.family
@@ -147,7 +145,7 @@ def _decided(task: Task, note: Callable[[str], None]) -> _Found:
         if test.contradicts and by_output.final.effects:
             return replace(by_output, specification=test)
     if again is not None and again.effects and space.is_noise(again) and space.small_unwhitened(again):
-        # It leaves noise: no other way to explain the same is followed, and what it may lack is looked for from there.
+        # It leaves noise: no other explanation of the same is searched, only effects that this model may lack.
         final = _beam(space).run([reduced_by(again, _reductions(space), space.prefers, space.score)])
         base = space.bare(final)
     else:
@@ -196,8 +194,8 @@ def _by_output_errors(output: ByOutputErrors, bases: Sequence[Fit], note: Callab
 def _informed(output: ByOutputErrors, linear: Fit, axis: Fit | None) -> Task:
     """The task under output errors, with as many independent samples as the errors of the linear model contain.
 
-    Or those of the regressed axis, if they are more: the errors of a better model are more independent. But a rigid axis in the
-    place of a shaft that swings only leaves its ringing.
+    Those of the regressed axis count if they are more: the errors of a better model are more independent.
+    They do not count where a rigid axis fits worse than a shaft that swings: its errors are the ringing of the shaft.
     """
     fits = [linear]
     if axis is not None and (axis.cost <= linear.cost or linear.parameters.masses == 1 or not swings(linear)):
@@ -210,8 +208,8 @@ def _explored(task: Task, space: Moves, bases: Sequence[Fit]) -> tuple[Fit, Fit]
     ends: list[tuple[Fit, Fit]] = []
     for base in bases:
         end = _searched(space, base)
-        if space.swings(base) and not space.swings(end):  # its shaft went into something else: as a shaft it counts all the same
-            end = base
+        if space.swings(base) and not space.swings(end):
+            end = base  # the search replaced the shaft by effects: the model with the shaft stays a candidate
         # On a coarse grid a resonance beyond what it shows stands for another fast effect: the fit to all samples decides.
         # Two overdamped masses describe some other effect, which one mass leaves in the error.
         shown = task.scales.blocks == 1 or resonance(end) < POLICY.seen_band * np.pi / task.scales.dt
@@ -269,14 +267,15 @@ def _as_innovations(space: Moves, fit: Fit) -> Fit:
 
     A prefilter shows no fast resonance: whitened errors do, and it is looked for again.
     """
-    return space.settled(space.finished(ls.reestimated(space.objective, ls.scored(space.objective, fit))))
+    return space.with_best_resonance(space.finished(ls.reestimated(space.objective, ls.scored(space.objective, fit))))
 
 
 def specification(space: Moves, task: Task, fit: Fit) -> Specification:
     """The specification test: the output errors of the whitened and of the output-error estimate of one model.
 
-    task: the one whose output errors are taken. What no estimate moves by slope, the order of a harmonic, is the same in both and
-    no degree of freedom. H is 0 where the whitened estimate's errors are no larger than noise, as torques and in the free run.
+    task: the one whose output errors are taken.
+    What no estimate moves by slope, the order of a harmonic, is the same in both and no degree of freedom.
+    H is 0 where the whitened estimate's errors are no larger than noise, as torques and in the free run.
     Where they are that, and white without a filter, the two estimates are one: no prefilter keeps white noise from being noise.
     """
     freedom = int(np.count_nonzero(fit.parameters.steps()))
@@ -294,9 +293,9 @@ def specification(space: Moves, task: Task, fit: Fit) -> Specification:
 
 
 def _on_all_samples(task: Task, outline: _Found, note: Callable[[str], None]) -> _Found:
-    """What the coarse grid came to, fitted to all samples, reduced, and grown by what the grid could not show.
+    """The model found on the coarse grid, fitted to all samples, reduced, and grown by what the grid could not show.
 
-    Output errors are weighed anew: what the low-pass of the coarse grid's prefilter removes is what that grid could not show.
+    Output errors get a new prefilter: the low-pass of the coarse one removes what that grid could not show.
     """
     data, family, found = task.data, task.objective.family, outline.space.objective.family
     if outline.final.parameters.masses == 1:  # no stiff shaft, no fine substeps
@@ -316,7 +315,7 @@ def _on_all_samples(task: Task, outline: _Found, note: Callable[[str], None]) ->
     base, final = (_moved(space, task.scales, f) for f in (outline.base, outline.final))
     final = reduced_by(final, _reductions(space), space.prefers, space.score)
     note(f"looking beyond {words(final.effects) or 'the linear model'}, at all samples")
-    # What acts within a step of the coarse grid, it can only show as a resonance: all samples are asked without that one, too.
+    # An effect faster than a step of the coarse grid shows there as a resonance: the search also starts without that resonance.
     ways = [final, *(space.without(final, t.name) for t in final.parameters.terms if t.resonates)]
     if resonance(final) * outline.space.data.dt > 1.0:  # no decision: a time constant 1/w that is shorter than a step
         ways += space.demoted(final)
@@ -326,9 +325,9 @@ def _on_all_samples(task: Task, outline: _Found, note: Callable[[str], None]) ->
 
 
 def _searched_whole(task: Task, found: _Found, note: Callable[[str], None]) -> _Found:
-    """The search over all samples, in the loop, and what the coarse grid led to where that scores better there.
+    """The search over all samples, in the loop; or the model found on the coarse grid, where that scores better there.
 
-    On a coarse grid the controller's torque drives the model, and what stops or hits something runs away from the record.
+    On a coarse grid the controller's torque drives the model, and beside stops and impacts its error grows.
     """
     note("searching all samples, in the loop")
     whole = _decided(task, note)
@@ -343,7 +342,7 @@ def _moved(space: Moves, scales: Scales, fit: Fit) -> Fit:
 
 
 def _compared(found: _Found, classes: Classes, note: Callable[[str], None]) -> Selection:
-    """In the deepest valley near by, with the rivals of each effect; a better one takes its place, and all are compared again."""
+    """The model of least cost near by, with the rivals of its effects; a better rival replaces it and is compared in turn."""
     space, final = found.space, found.space.deepened(found.final)
     for swaps_left in range(POLICY.swaps, -1, -1):
         rivals, better = _rivals(space, final, swaps_left > 0, classes, note)
@@ -357,7 +356,7 @@ def _compared(found: _Found, classes: Classes, note: Callable[[str], None]) -> S
 
 
 def by_whitened_errors(selection: Selection, classes: Classes, note: Callable[[str], None]) -> Selection | None:
-    """What whitened errors had selected, where output errors decided and their model names nothing; None where there is none."""
+    """What whitened errors had selected, with its rivals; None where that model decided, or none was searched."""
     return None if selection.whitened is None else _compared(selection.whitened, classes, note)
 
 
@@ -372,10 +371,10 @@ def _rivals(
 ) -> tuple[dict[str, tuple[float, list[Replacement]]], Fit | None]:
     """(rivals of each effect, a better model where there is one and a swap is allowed).
 
-    Where a record cannot split a load or a dead band from dry friction, friction stands first: every axis has it.
+    Where a record cannot tell a load or a dead band from dry friction, friction has the name: every axis has it.
     """
     found: dict[str, tuple[float, list[Replacement]]] = {}
-    # What gains least is the likeliest to give way; then all are asked again.
+    # The effect that gains least comes first: it is the likeliest to be replaced, and then all are compared again.
     for term in sorted(final.parameters.terms, key=lambda t: space.without(final, t.name).bic):
         note(f"rivals of {words([term.name])}")
         here = classes(term.name)
@@ -388,7 +387,7 @@ def _rivals(
         needed = space.penalty if contained else space.margin if first.effect in here else space.policy.swap
         better = first if first.behind < -needed else None
         if better is None:
-            # Of what these records cannot tell apart, the simplest of a family before what belongs to another one, or to none.
+            # Of effects that these records cannot tell apart, the simplest of a family is preferred to those outside of it.
             others = (r for r in rivals if r.effect in here and r.behind < space.margin)
             better = next((r for r in others if r.term.simplest and r.term.family != term.family), None)
         if better is None and (first_of := representative(term)) != term.name:

@@ -2,23 +2,28 @@
 
     w_m(n) = (theta(n) - theta(n-1))/T = 1/T int w dt over the last sample of the controller
 
-is the mean over that sample, to second order in T the velocity in its middle. That is no cause: every drive that differences its
-encoder has it. Left out, it is fitted as a delay or, beside a current loop, as a resonance.
+is the mean over that sample, to second order in T the velocity in its middle.
+That is no cause: every drive that differences its encoder has this age.
+A search without it fits it as a delay or, beside a current loop, as a resonance.
 
-- Where the angle is logged and the velocity is its difference, nothing is left to ask.
-- The lattice of the velocities says how many lines the encoder had. Where they are a whole number, or a power of two as far as
-  the decimals of a log show, the velocity is taken for a difference. Not every velocity on such a lattice is one: an observer or
-  the drive's firmware may round to it. So both ages are fitted, with the linear mechanism alone and with the lag of a current
-  loop, and it is none where the age of 0 scores better beyond the margin of two rivals.
-- On another lattice (a gear, a scale, a unit between) the velocity may be a difference. Where the search finds something linear
-  in series with the mechanism, a delay, a lag or a resonance, it is made again with the age of half a sample, which is no effect
-  and costs nothing; it is there where fewer effects score better with it, or as many by the margin of two rivals, both under the
-  errors of the first search.
+- Where the angle is logged and the velocity is its difference, the age is known.
+- The lattice of the velocities says how many lines the encoder had.
+  Where they are a whole number, or a power of two as far as the decimals of a log show, the velocity may be a difference.
+  Not every velocity on such a lattice is one: an observer or the drive's firmware may round to it.
+  So both ages are fitted, with the linear mechanism alone and with the lag of a current loop.
+  The velocity is no difference where the age of 0 scores better by more than the margin of two rivals.
+- On another lattice (a gear, a scale, a unit between) the velocity may be a difference.
+  Where the search finds a delay, a lag or a resonance in series with the mechanism, it is made again with the age of half
+  a sample, which is no effect and costs nothing.
+  The age is accepted where fewer effects score better with it, or as many effects by the margin of two rivals,
+  both under the errors of the first search.
 
-A torque that drives the model is held over each line of the log. That of a controller which is faster than the log goes on
-between the lines: its mean over a line of r samples is (r - 1)/(2r) lines ahead, less the age of the velocity. A motion before
-its torque is nothing that an axis can do, so where the inverse-dynamics regression shows one, it is this, and the age is below 0
-(estimation/regression/torque_lag.py). What is late by less than half a line is not seen in such a log.
+A torque that drives the model is held over each line of the log.
+The torque of a controller which is faster than the log changes between the lines:
+its mean over a line of r samples is (r - 1)/(2r) lines ahead, less the age of the velocity.
+No axis moves before its torque.
+So where the inverse-dynamics regression shows such a motion, the age is below 0 (estimation/regression/torque_lag.py).
+A delay of less than half a line does not show in such a log.
 """
 
 from __future__ import annotations
@@ -218,8 +223,9 @@ def _score_under(data: DataSet, final: Fit, space: Moves) -> float:
 def _score(objective: Objective, scales: Scales, model: Model) -> float:
     """Score of the best linear mechanism with and without a lag of the torque, each under a noise filter of its own.
 
-    Fitted without the lag, a mechanism bends its resonance to make up for it, and a fit from there does not find the lag. So the
-    lag is also fitted to one mass, and the resonance beside it; one beyond what the records show would make up for the age.
+    A mechanism fitted without the lag has a wrong resonance in its place, and a fit from there does not find the lag.
+    So the lag is also fitted to one mass, and the resonance beside it.
+    A resonance faster than the records show is not allowed: it would replace the age.
     Each is scored: one that leaves least without a noise filter need not do so with one.
     """
     task = Task(objective, scales, model, (), lambda message: None).under(Innovations())

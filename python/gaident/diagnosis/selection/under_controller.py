@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gaident.control.controller import Controller
-from gaident.control.found import STEP, FoundNumbers
+from gaident.control.found import NUMBER_STEP, FoundNumbers
 from gaident.diagnosis.selection.model_space import ModelSpace
 from gaident.estimation import least_squares as ls
 from gaident.estimation.dataset import DataSet
@@ -72,7 +72,7 @@ class UnderController:
     ) -> tuple[Vector, Matrix]:
         """(whitened errors, their slopes with z beside what the model's own numbers can explain)."""
         v, J, E = slopes(objective, self.of(hypothesis, z), x, noise)
-        return v, project_out(J, E) / STEP
+        return v, project_out(J, E) / NUMBER_STEP
 
     def found(self, z: Vector) -> FoundNumbers:
         """The numbers of z, which the errors of the model show."""

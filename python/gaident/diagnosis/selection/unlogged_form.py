@@ -1,15 +1,16 @@
 """Another form of controller than the given PI as a hypothesis, for records without a torque.
 
-Without a logged torque the model is driven by what the given PI makes of command and velocity. A filter or a command weight that
-the drive has and the PI has not is then missing in that torque,
+Without a logged torque the model is driven by what the given PI makes of command and velocity.
+A filter or a command weight that the drive has and the PI has not is then missing in that torque,
 
     u = N(z) u',   e = r' - w',   r' = L(z) r,   w' = L(z) w   or   u = kp (b r - w) + I,
 
-and looks like mechanics: a lag, a resonance, an inertia that is far off. Each form has up to three numbers z, which are fitted
-with the model's (see `under_controller`).
+and looks like mechanics: a lag, a resonance, an inertia that is far off.
+Each form has up to three numbers z, which are fitted with the model's (see `under_controller`).
 
-A form is looked for where the selected model leaves more than noise, or has an effect that is linear in series, as a filter of
-the torque is. What it is worth is judged by the criterion that selected the model.
+A form is searched where the selected model leaves more than noise, or has an effect that is linear in series, as a filter of
+the torque is.
+It is judged by the criterion that selected the model.
 """
 
 from __future__ import annotations
@@ -25,7 +26,7 @@ from numpy.typing import NDArray
 from gaident.axis import Text, joined, say, unit_text
 from gaident.control.cascade import Cascade
 from gaident.control.filters import LowPass, Notch
-from gaident.control.found import STEP, FoundNumbers
+from gaident.control.found import NUMBER_STEP, FoundNumbers
 from gaident.control.pi import PI
 from gaident.diagnosis.selection.moves import Moves
 from gaident.diagnosis.selection.other_gains import OTHER_GAINS
@@ -52,7 +53,7 @@ DAMPING = (0.05, 2.0)  # no decision: denominators of notches that drives have
 
 @dataclass(frozen=True, eq=False)
 class _Number:
-    """A number of a form: its name and unit as a finding has them; its ends and starts for (sample time, duration) [s].
+    """A number of a form: name and unit for the finding; bounds and starts for (sample time, duration) [s].
 
     logarithm: whether it is searched by its logarithm.
     """
@@ -195,17 +196,17 @@ def in_series(fit: Fit) -> tuple[str, ...]:
 
 
 def unlogged_form(space: Moves, final: Fit) -> UnloggedForm | None:
-    """The form of controller with which the selected model, or what it is without effects in series, explains the records best.
+    """The form of controller with which the selected model, with or without its effects in series, explains the records best.
 
-    None where a torque is logged, where no bare PI from rest closes the loop, or where nothing asks for one: the model leaves
-    noise and contains nothing that a filter could be.
+    None where a torque is logged, or where the loop is not closed by a bare PI from rest.
+    None also where the model leaves noise and contains no effect in series, which a filter could replace.
     """
     data, series = space.data, in_series(final)
     if data.pi is None or any(r.torque is not None or r.command is None for r in data.records):
         return None
     if data.loop_only or any(data.moving) or any(data.stored) or (leaves_noise(space, final) and not series):
         return None
-    objective = replace(space.objective)  # with a memory of its own: every controller tried makes a data set
+    objective = replace(space.objective)  # with a memory of its own, because every controller makes another data set
     bases = [_without(space, final, series)]
     if not leaves_noise(space, final):
         bases += [final] * bool(series) + [_without(space, final, final.effects)] * (set(final.effects) > set(series))
@@ -291,14 +292,14 @@ def _fitted(
 ) -> _End | None:
     """(model, score, form, its numbers, their deviations) from one start; None where it diverges or ends at a bound.
 
-    Nor where its score stays beyond what is followed.
+    None also where its score stays too high to be followed (`beyond`).
     """
     end = under.fitted(space, objective, base, z, beyond)
     if end is None:
         return None
     z, found = end
-    zero = (under.low == 0.0) & (z == 0.0)  # a weight of 0, or zeros without damping, are what drives have
-    at_end = (z > under.high - STEP) | ((z < under.low + STEP) & ~zero)
+    zero = (under.low == 0.0) & (z == 0.0)  # drives have a weight of 0, or zeros without damping
+    at_end = (z > under.high - NUMBER_STEP) | ((z < under.low + NUMBER_STEP) & ~zero)
     if bool(at_end.any()):
         return None
     score = space.score(found) + cost_of(len(z), objective.information) + space.penalty
@@ -306,7 +307,7 @@ def _fitted(
 
 
 def _finding(variant: _Variant, z: Vector, stds: Vector, gain: float, others: list[Text]) -> Finding:
-    """What is reported of a form that takes the place of the given controller; others: forms that come as close."""
+    """What is reported of a form that takes the place of the given controller; others: forms that explain as much."""
     estimates = {n.name: n.estimate(x, float(std)) for n, x, std in zip(variant.numbers, z, stds, strict=True)}
     text = (
         "No {torque} is logged; under a controller with {} ({}) command and velocity agree with the axis, and the best model "

@@ -10,8 +10,8 @@ s is the torque at the shaft: the logged torque behind the model's actuator, and
 m is found by simulation: a stiff PI loop leads the mechanism, with its effects at shaft and coupling, along the filtered motion.
 Its torque is m. Without effects that is inverse filtering, m = w/G.
 
-The force error needs no start and adds nothing up: where an axis integrates, or falls under gravity, a free run drifts away from
-the record by what is small in every sample, and this figure does not.
+The force error needs no initial state and integrates nothing.
+Where an axis integrates, or falls under gravity, small errors of every sample add up in a free run, but not in this figure.
 Theory: docs/theory/inverse-dynamics.md.
 """
 
@@ -194,8 +194,9 @@ class FilteredRecords:
 def needed_torque(model: Model, rec: Record, cutoff_hz: float, order: int = ORDER) -> Vector:
     """The torque [N m] with which the model's mechanism moves as the filtered motion of a record, an array (n,).
 
-    Effects of the actuator, and a sensor's filter, act on the torque before and are left out here; see `force_error`. A commanded
-    torque is held over each sample, so its mean over the sample is given; beside a measured torque the value at the sample.
+    Effects of the actuator, and a sensor's filter, act on the torque before and are left out here; see `force_error`.
+    A commanded torque is held over each sample, so its mean over the sample is given;
+    beside a measured torque the value at the sample.
     Raises ModelError where the model cannot be led along a motion.
     """
     return _led(model, rec, motion_of(rec, cutoff_hz, order), cutoff_hz)

@@ -42,9 +42,10 @@ def inverse_dynamics(
     All channels pass the same zero-phase filter; velocity and acceleration are central differences of the position, or, where
     none is logged, the velocity and its differences. The columns and the torque are then low-passed alike and decimated.
     Samples with a velocity below three deviations of its noise, or below 0.5 % of its rms, and those within 1/cutoff of
-    them, are left out: dry friction at standstill is whatever the other torques are. The terms are those with the smallest
-    BIC over the number of independent samples; gravity, a spring and friction by direction also have to take 5 % of the sum
-    of squares. Gravity is tried from a sixth of a turn of travel on, a spring to ground in its place.
+    them, are left out: dry friction at standstill is whatever the other torques are.
+    The terms are those with the smallest BIC over the number of independent samples;
+    gravity, a spring and friction by direction also have to take 5 % of the sum of squares.
+    Gravity is tried from a sixth of a turn of travel on, a spring to ground in its place.
     Theory: docs/theory/inverse-dynamics.md.
 
     Parameters
@@ -55,8 +56,8 @@ def inverse_dynamics(
         Names of terms, or None to let the criterion choose: "inertia", "viscous" or "viscous_by_direction", "coulomb" or
         "coulomb_by_direction", "offset", "gravity", "spring".
     cutoff_hz : float, optional
-        Corner of the filter [Hz]. None: the highest at which noise is at most 0.1 % of the acceleration's power, at
-        most a tenth of the sample rate.
+        Corner of the filter [Hz].
+        None: the highest at which noise is at most 0.1 % of the acceleration's power, at most a tenth of the sample rate.
     order : int
         Order of the Butterworth filter, 1 to 10; it runs forward and backward.
     decimation : int, optional
@@ -64,8 +65,8 @@ def inverse_dynamics(
     standstill : float, optional
         Velocity up to which the axis stands [rad/s]. None: the rule above. 0.0: nothing is left out, as in the literature.
     validation : Record or sequence of Record, optional
-        Records that are not fitted, for the held-out force error. None: the last 30 % of the samples in motion of each
-        record are held out from a second fit of the same terms.
+        Records that are not fitted, for the held-out force error.
+        None: the last 30 % of the samples in motion of each record are held out from a second fit of the same terms.
     axis : {"rotary", "linear"}
         "rotary" or "linear" (m, m/s, N). Gravity depends on the angle of a rotary axis only.
 
@@ -83,9 +84,9 @@ def inverse_dynamics(
 
     References
     ----------
-    M. Gautier, "Dynamic identification of robots with power model", ICRA 1997. A. Janot, P.-O. Vandanjon, M. Gautier,
-    "A generic instrumental variable approach for industrial robot identification", IEEE Transactions on Control
-    Systems Technology 22(1):132-145, 2014.
+    M. Gautier, "Dynamic identification of robots with power model", ICRA 1997.
+    A. Janot, P.-O. Vandanjon, M. Gautier, "A generic instrumental variable approach for industrial robot identification",
+    IEEE Transactions on Control Systems Technology 22(1):132-145, 2014.
 
     Examples
     --------

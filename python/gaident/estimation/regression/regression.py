@@ -4,9 +4,10 @@
     cov   = (X'X)^-1 S (X'X)^-1
     S     = sum_j k(j) sum_i (x_i r_i)(x_i-j r_i-j)',   k(j) = 1 - |j|/(L + 1) for |j| <= L       (Newey and West 1987)
 
-L = 1.3 sqrt(n), as Lazarus, Lewis, Stock and Watson (2018) recommend for tests. No deviation is smaller than that of
-white residuals. Columns are chosen by the criterion of all models (estimation/criterion.py), with the independent samples of
-the residuals. Theory: docs/theory/inverse-dynamics.md.
+L = 1.3 sqrt(n), as Lazarus, Lewis, Stock and Watson (2018) recommend for tests.
+No deviation is smaller than that of white residuals.
+Columns are chosen by the criterion of all models (estimation/criterion.py), with the independent samples of the residuals.
+Theory: docs/theory/inverse-dynamics.md.
 
 W. K. Newey, K. D. West, Econometrica 55(3):703-708, 1987.
 E. Lazarus, D. J. Lewis, J. H. Stock, M. W. Watson, Journal of Business and Economic Statistics 36(4):541-559, 2018.
@@ -25,7 +26,7 @@ Vector = NDArray[np.float64]
 Matrix = NDArray[np.float64]
 
 LAGS_PER_ROOT = 1.3  # no decision: of an estimate of variance, see above
-RANK = 1e-10  # no decision: of a solver
+SOLVER_RANK = 1e-10  # no decision: of a solver
 """Singular values below this share of the largest, of columns of equal length, are zero."""
 
 
@@ -33,7 +34,7 @@ def solve(X: Matrix, y: Vector) -> tuple[Vector, int]:
     """(theta (k,), rank): the least-squares solution of X theta = y, columns scaled to equal length first."""
     length = np.linalg.norm(X, axis=0)
     length[length == 0.0] = 1.0
-    theta, _, rank, _ = np.linalg.lstsq(X / length, y, rcond=RANK)
+    theta, _, rank, _ = np.linalg.lstsq(X / length, y, rcond=SOLVER_RANK)
     return np.asarray(theta / length), int(rank)
 
 
@@ -47,7 +48,7 @@ def covariance(X: Sequence[Matrix], residuals: Sequence[Vector]) -> Matrix:
     length = np.linalg.norm(whole, axis=0)
     scale = np.where(length > 0.0, length, 1.0)
     values, vectors = np.linalg.eigh((whole / scale).T @ (whole / scale))
-    known = values > RANK**2 * values[-1] if values[-1] > 0.0 else np.zeros(k, dtype=bool)
+    known = values > SOLVER_RANK**2 * values[-1] if values[-1] > 0.0 else np.zeros(k, dtype=bool)
     known &= values > 1e-12 * k
     inverse = (vectors[:, known] / values[known]) @ vectors[:, known].T
     middle = np.zeros((k, k))

@@ -2,11 +2,13 @@
 
     u = J a + B w + C sign(w) + D cbrt(w) + T (+ gravity or a spring)
 
-Dry friction is the one torque that jumps where the velocity changes its sign. A regression without D finds a jump in every drag
-that rises steeply from zero, as of a root, and with many samples a very significant one. The column cbrt(w) rises more steeply
-than such a drag: with it C is what remains of the torque close to the reversal, or has a wide deviation where the motion shows
-too little of that. What else the axis has, a friction that depends on load, angle or time, stays in the residuals, and in the
-deviations, which know that neighbouring residuals are alike.
+Dry friction is the one torque that jumps where the velocity changes its sign.
+A regression without D finds a jump in every drag that rises steeply from zero, as of a root,
+and with many samples a very significant one.
+The column cbrt(w) rises more steeply than such a drag: with it C is what remains of the torque close to the reversal,
+or has a wide deviation where the motion shows too little of that.
+What else the axis has, a friction that depends on load, angle or time, stays in the residuals, and in the deviations,
+which know that neighbouring residuals are alike.
 
 An axis that rests while its torque changes by 2 H is held by dry friction of at least H: a drag needs a velocity, a load and
 gravity are constant at one angle. No model, and no motion, is needed for that.

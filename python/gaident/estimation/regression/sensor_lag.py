@@ -2,8 +2,8 @@
 
     w_f = w(t - tau) = v - tau a + ...,   tau = -sum (w_f - v) a / sum a^2
 
-v and a are the slopes of the position, w_f the logged velocity, all behind the same zero-phase filter. A velocity that is the
-position's backward difference is late by half a sample; a velocity filter by its time constant.
+v and a are the slopes of the position, w_f the logged velocity, all behind the same zero-phase filter.
+A velocity that is the position's backward difference is late by half a sample; a velocity filter by its time constant.
 """
 
 from __future__ import annotations

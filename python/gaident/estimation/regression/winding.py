@@ -64,8 +64,9 @@ def estimate_winding(
 
         U_h(n) = R i(n) + ke w(n) + L (i(n+1) - i(n-1))/(2 dt) + U0,   U_h(n) = (U(n) + U(n-1))/2
 
-    by least squares, all signals behind the same zero-phase filter and decimated. U_h is what a voltage that is held over each
-    sample shows in a central difference. The deviations know that neighbouring errors are alike (Newey and West 1987).
+    by least squares, all signals behind the same zero-phase filter and decimated.
+    U_h is what a voltage that is held over each sample shows in a central difference.
+    The deviations know that neighbouring errors are alike (Newey and West 1987).
 
     Parameters
     ----------

@@ -21,7 +21,7 @@ __all__ = ["Explanation", "control_error", "explain", "rounded_command", "white_
 
 Vector = NDArray[np.float64]
 
-ROUNDING = 1e-9  # no decision: of the largest torque, what a sum is exact to
+SUM_ROUNDING = 1e-9  # no decision: of the largest torque, what a sum is exact to
 Allows: TypeAlias = Callable[[Vector, tuple[float, float], int], bool]
 """Whether what is off [N m] under limits of torque and integrator, from a sample on, is no more than rounding."""
 
@@ -71,7 +71,7 @@ class _Case(NamedTuple):
 
 
 def explain(command: Vector, velocity: Vector, dt: float, controller: PI, logged: Vector, allowed: Allows) -> Explanation | None:
-    """The first reason that leaves what `allowed` takes for rounding; else the best, if it leaves white noise."""
+    """The first reason that leaves only rounding as `allowed` says; else the best one, if it leaves white noise."""
     case = _Case(command, velocity, dt, controller, logged)
     best, least = None, np.inf
     for reason in (_start, _limits, _anti_windup, _rate, _linear):
@@ -87,10 +87,10 @@ def explain(command: Vector, velocity: Vector, dt: float, controller: PI, logged
 
 
 def rounded_command(off: Vector, command: Vector, dt: float, controller: PI) -> bool:
-    """Whether what is off [N m] is what the controller makes of a command that is off by no more than a log's decimals.
+    """Whether the error `off` [N m] is that of a command which is off by no more than the decimals of a log.
 
-    A command that is held is off by the same for as long, which adds up in the integrator. The error d(n) of the command that
-    makes off(n), h = ki dt/2:
+    A command that is held has the same error for as long, which adds up in the integrator.
+    The error d(n) of the command that makes off(n), h = ki dt/2:
 
         off(n) - off(n-1) = (kp + h) d(n) - (kp - h) d(n-1)
     """
@@ -103,7 +103,7 @@ def control_error(torque: Vector, controller: PI, dt: float) -> Vector | None:
 
         (kp + h) e(n) = (kp - h) e(n-1) + u(n) - u(n-1)
 
-    Both are 0 before the record. None where a limit hides it, or where it would grow without end.
+    Both are 0 before the record. None where a limit hides it, or where the recursion is unstable.
     """
     kp, h = controller.kp, 0.5 * controller.ki * dt  # no decision: the trapezoidal rule
     if kp <= h or controller.limited:
@@ -172,7 +172,7 @@ def _limited(case: _Case) -> list[PI]:
 
 
 def _rules(controller: PI) -> Iterator[tuple[float, str]]:
-    """(share, words to go before others) of the rules of integration; one alone where nothing is integrated."""
+    """(share, words to go before others) of the rules of integration; only one rule without an integral gain."""
     for share, words in RULES.items():
         if share == 0.0 or controller.ki:
             yield share, f"{words} and " if words else ""
@@ -186,7 +186,7 @@ def _trapezoidal(controller: PI, share: float, dt: float) -> PI:
 def _cuts(case: _Case, torque: Vector, share: float) -> bool:
     """Whether a limited torque comes closer than that of the same rule of integration without this limit, which is not exact."""
     without = case.logged - case.torque(_trapezoidal(case.controller, share, case.dt))
-    if float(np.abs(without).max()) <= ROUNDING * float(np.abs(case.logged).max()):
+    if float(np.abs(without).max()) <= SUM_ROUNDING * float(np.abs(case.logged).max()):
         return False
     return float(np.sum((case.logged - torque) ** 2)) < POLICY.better_reason**2 * float(np.sum(without**2))
 

@@ -1,7 +1,7 @@
 """Controller replay: run again on the measured velocity; does the logged torque follow from it?
 
-No plant is needed: what the controller does is decided before any mechanism is considered. Where the
-logged torque does not follow from a bare PI, `causes` looks for the simple reasons.
+No plant is needed: what the controller does is decided before any mechanism is considered.
+Where the logged torque does not follow from a bare PI, `causes` looks for the simple reasons.
 
 A diagnosis asks for the replay of a record in several places: each is kept for as long as its record is.
 """
@@ -30,7 +30,7 @@ __all__ = ["Replay", "replay", "rounding_of", "tolerance_of", "velocity_steps"]
 
 Vector = NDArray[np.float64]
 
-ROUNDING = 1e-6  # no decision: of the largest torque, what a controller in single precision is exact to
+SINGLE_PRECISION = 1e-6  # no decision: of the largest torque, what a controller in single precision is exact to
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,8 +73,8 @@ _KEPT: MutableMapping[Record, dict[Controller | None, Replay]] = WeakKeyDictiona
 def replay(rec: Record, controller: Controller | None) -> Replay:
     """Runs the controller again on the measured velocity and compares with the logged torque.
 
-    controller: None for the open loop, where the record's torque is returned as it is. Raises RecordError where neither a
-    torque nor what makes one is there.
+    controller: None for the open loop, where the record's torque is returned as it is.
+    Raises RecordError where neither a torque nor what makes one is there.
     """
     kept = _KEPT.setdefault(rec, {})
     if controller not in kept:
@@ -154,15 +154,16 @@ def _compared(rec: Record, command: Vector, controller: Controller, logged: Vect
 def velocity_steps(records: Sequence[Record]) -> tuple[tuple[float, ...], ...]:
     """Steps [rad/s] that the velocities of each record may be rounded to by the log, one tuple an assumption, the finest first.
 
-    The digits of a text log are its rounding. A lattice beside them is the log's too (16 bits of a reference speed), or it is
-    the encoder's, and then the controller read the same numbers. A torque that follows to the digits shows which.
+    The digits of a text log are its rounding.
+    A lattice beside them is the log's too (16 bits of a reference speed), or it is the encoder's,
+    and then the controller read the same numbers. A torque that follows to the digits shows which.
     """
     ranges = [POLICY.negligible * float(np.ptp(r.velocity)) for r in records]
     fine, coarse = (
         tuple(q if q < most else 0.0 for q, most in zip((step(r.velocity) for r in records), ranges, strict=True))
         for step in (digits_step, rounding_step)
     )
-    return (fine,) if np.allclose(fine, coarse, rtol=ROUNDING, atol=0.0) else (fine, coarse)
+    return (fine,) if np.allclose(fine, coarse, rtol=SINGLE_PRECISION, atol=0.0) else (fine, coarse)
 
 
 def tolerance_of(rec: Record, command: Vector, controller: VelocityGains, logged: Vector, step: float) -> float:
@@ -175,9 +176,9 @@ class Allowed:
     """What a log's rounding makes of a replay, at most.
 
     step: that the log rounds velocities to [rad/s]; it does not round a command more coarsely.
-    torque: steps of the torque's rounding, and what rounded velocity, command and positions do to P part and integral [N m]. Each
-    of N velocities is rounded by itself, a command once for all the samples that it is held; the integrator adds up what is off,
-    evenly within +-q/2:
+    torque: steps of the torque's rounding, and what rounded velocity, command and positions do to P part and integral [N m].
+    Each of N velocities is rounded by itself, a command once for all the samples that it is held;
+    the integrator adds up what is off, evenly within +-q/2:
 
         sum of the squares = ki^2 dt^2 (N q_w^2 + sum L_i^2 q_r^2)/12        L_i: samples for which a command is held
 
@@ -194,7 +195,7 @@ class Allowed:
     def of(
         cls, rec: Record, command: Vector, controller: VelocityGains, logged: Vector, step: float, placed: float = 0.0
     ) -> Allowed:
-        own = POLICY.replay_steps * rounding_step(logged) + ROUNDING * float(np.abs(logged).max())
+        own = POLICY.replay_steps * rounding_step(logged) + SINGLE_PRECISION * float(np.abs(logged).max())
         at_once, drift = _of_signals(rec, command, controller, step)
         sample = controller.ki * rec.dt * (step + _of_command(command, step))
         error = controller.kp * (command - rec.velocity)
@@ -248,12 +249,15 @@ def _of_signals(rec: Record, command: Vector, controller: VelocityGains, q_w: fl
 
 
 def rounding_of(rec: Record, command: Vector, controller: PI, logged: Vector, step: float) -> float:
-    """Root mean square of what rounding makes of a replay [N m]: a torque of d digits is off by its own last one."""
+    """Root mean square of what rounding makes of a replay [N m].
+
+    A torque printed with d digits is off by one unit of the last digit.
+    """
     size, own = np.abs(logged), rounding_step(logged)
     steps = np.full(len(logged), own)
     if own > 0.0 and lattice_step(logged) == 0.0:
         highest = np.floor(np.log10(size.max()))
         steps *= 10.0 ** (np.floor(np.log10(np.where(size > 0.0, size, size.max()))) - highest)
     at_once, drift = _of_signals(rec, command, controller, step)
-    rounded = float(np.mean(steps**2)) / 12.0 + ROUNDING**2 * float(np.mean(logged**2))
+    rounded = float(np.mean(steps**2)) / 12.0 + SINGLE_PRECISION**2 * float(np.mean(logged**2))
     return float(np.sqrt(rounded + at_once**2 / 12.0 + drift**2))

@@ -1,7 +1,8 @@
 """Text packed for a page: what makes a page large is the library that draws its figures, and the numbers of the figures.
 
-Browsers unpack gzip by themselves, which leaves 1.5 MB of plotly.js. LZMA leaves 1.1 MB; unpack.js unpacks it, in a browser of
-any age, within half a second. Its bits go into letters, 13 of them into two of 91 letters,
+Browsers unpack gzip by themselves, which leaves 1.5 MB of plotly.js.
+LZMA leaves 1.1 MB; unpack.js unpacks it, in a browser of any age, within half a second.
+Its bits go into letters, 13 of them into two of 91 letters,
 
     v = a + 91 b,   0 <= v < 2^13 <= 91^2
 
