@@ -99,8 +99,8 @@ def as_logged(records: Sequence[Record], controller: PI | None) -> AsLogged:
     if all(r.cause == "scale" for r in off):
         either = (
             " The log does not say which is wrong, the gains or a factor of the {torque} (its unit, a rated {torque}, a "
-            "{torque} constant). If the gains are as given, {inertia}, friction and every other {torque} below are {:.4g} times as "
-            "large."
+            "{torque} constant). If the gains are as given, {inertia}, friction and every other {torque} below are {:.4g} times "
+            "as large."
         )
         used = joined("", (used, say(either, controller.kp / kp)))
     shown = replace(controller, kp=kp, ki=ki)
