@@ -21,6 +21,10 @@ Vector = NDArray[np.float64]
 
 ELECTRICAL = frozenset({"voltage", "current"})
 """Columns that are no channel of a record, but make its torque."""
+LAGS = (
+    "The inductance L of the winding is not given, and its torque is made as if the current followed the voltage at once: the lag "
+    "L/R that it has in the motor then looks like a filter of the velocity, or like a lag of the torque. Give the inductance [H]."
+)
 
 
 def torque_of_winding(table: LogTable, wanted: Wanted, values: Mapping[str, Vector], dt: float) -> tuple[Vector, str, str]:
@@ -54,4 +58,5 @@ def torque_of_winding(table: LogTable, wanted: Wanted, values: Mapping[str, Vect
             f"{arg('resistance', '...')} [Ohm] and {arg('torque_constant', '...')} [N m/A], or name the current's column"
         )
     winding = Winding(known.resistance, known.torque_constant, known.inductance or 0.0, known.back_emf_constant)
-    return winding.torque(voltage, values["velocity"], dt), kind, ""
+    note = "" if known.inductance is not None else LAGS
+    return winding.torque(voltage, values["velocity"], dt), kind, note

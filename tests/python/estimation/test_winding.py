@@ -143,6 +143,8 @@ def test_back_emf_apart_from_viscous_friction(here: Path) -> None:
     assert [rec.torque_is for rec in (by_volt, known, estimated, plain)] == ["commanded", *["measured"] * 3]
     assert known.notes == plain.notes == () and len(estimated.notes) == 1
     assert "The winding was estimated from voltage, current and velocity: R = 0." in estimated.notes[0]
+    at_once = ga.read("motor.csv", {**COLUMNS, "voltage": "U"}, resistance=R, torque_constant=KT)
+    assert "looks like a filter of the velocity, or like a lag of the torque" in at_once.notes[0] and known.notes == ()
     viscous = {}
     for name, rec in (("voltage", by_volt), ("known", known), ("estimated", estimated), ("current", plain)):
         p = ga.inverse_dynamics(rec, terms=("inertia", "viscous", "coulomb")).parameters
