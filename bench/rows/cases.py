@@ -20,6 +20,10 @@
     sampled     measured torques in lines of 1 to 10 ms, sampled or held (rows/slow_torques.py)
     short_moves effects outside the library in a single step or move, which hardly tells effects apart (rows/short_moves.py)
     lags        measured torques behind a lag, behind other gains, or only written late (rows/lags.py)
+    proposals   experiments that are proposed, run on the axis that they are for (rows/proposals.py)
+    unlogged    logs without a torque, of a controller with a filter that the given one has not (rows/unlogged.py)
+    responses   frequency responses that a record shows by itself (rows/responses.py)
+    headers     names of columns, commas and letters of text logs (rows/headers.py)
 
 A result has three parts: an outcome, what is said (verdict and findings; the structure; the terms), and a digest of the rest that
 a user reads: parameters to three digits, notes, comparisons, the next experiment.
@@ -44,13 +48,17 @@ import success
 from rows.case import Case, Result, digest
 from rows.encoders import encoders, lines_shown
 from rows.forms import forms, shown
+from rows.headers import header_read, headers
 from rows.lags import lag_found, lags
 from rows.logs import logs, read_log
 from rows.periods import period_taken, periods
 from rows.profiles import interpolated, profiles
+from rows.proposals import kept, proposals
+from rows.responses import responses, shown_points
 from rows.short_moves import described, short_moves
 from rows.slow_torques import ahead, measured_torques, named_ahead, named_sampled
 from rows.slower import EVERY, shown_slower, slower_forms
+from rows.unlogged import form_found, unlogged
 
 import gaident as ga
 from blind_judge import judge
@@ -262,5 +270,9 @@ KINDS: dict[str, tuple[Callable[[int, int], list[Case]], Callable[[Case], Result
     "sampled": (measured_torques, named_sampled),
     "short_moves": (short_moves, described),
     "lags": (lags, lag_found),
+    "proposals": (proposals, kept),
+    "unlogged": (unlogged, form_found),
+    "responses": (responses, shown_points),
+    "headers": (headers, header_read),
 }
 """Kind -> what makes its cases (count, seed), and what runs one."""

@@ -144,7 +144,12 @@ def carried(function: Callable[..., Any], *arguments: Any) -> Any:
     plain = function(*(a.plain if isinstance(a, Watched) else a for a in arguments))
     others = {}
     for key in keys - watch.turned:
-        value = function(*(a.others.get(key, a.plain) if isinstance(a, Watched) else a for a in arguments))
+        try:
+            value = function(*(a.others.get(key, a.plain) if isinstance(a, Watched) else a for a in arguments))
+        except ArithmeticError:  # a division by 0 there: the run would go another way
+            watch.turned.add(key)
+            watch.used.add(key[0])
+            continue
         if not _same(plain, value):
             others[key] = value
     if isinstance(plain, (bool, np.bool_)) or getattr(plain, "dtype", None) == np.bool_:

@@ -114,6 +114,8 @@ EFFORTS = """\
 
 Budgets of a search or a fit: more of these may find more, and changes no decision about what was found.
 So no command measures one of them.
+`hope`, `part_reach` and `slow_fall` are shares by which candidates are pruned: what they leave out is never fitted to the end.
+Such a candidate may be what would have been found, so these three are nearer to a decision than the others.
 
 | number | value | unit | what it is |
 |---|---|---|---|
@@ -156,12 +158,18 @@ Outside of it some comparison changes, which need not change what is said: the c
 | number | cases | seed | on | read in | no decision changes | below | above |
 |---|---|---|---|---|---|---|---|
 {changes}
-Moved either way, these change nothing that is said in these cases, as they are no finer than a factor of two, or these cases do
-not show them:
+Moved either way, these {count} change nothing that is said in these cases, as they are no finer than a factor of two, or these
+cases do not show them:
 {free}.
 
-{left}
-{open}"""
+{left}{open}"""
+
+MOVED = """\
+Every number that decides was moved to half and to twice in cases of the kind that its row names.
+Of the {all} numbers {shown} change something that is said there: these cases show that the value matters.
+Of the other {free}, listed above, they show only that half and twice of it would do as well in these cases; whether another case
+needs the value is open.
+"""
 
 LEFT = """\
 Not run again are {count} runs, for the time that they take: about {minutes} minutes of one processor.
@@ -169,6 +177,7 @@ They belong to
 {names}.
 Most of these numbers enter a bound, a probability or a fit of nearly every case, so that some comparison changes in nearly every
 one. Where some of its cases were run, these are the first ones, and what they show stands before "not run".
+
 """
 
 
@@ -208,12 +217,14 @@ def _changes() -> str:
     names = {m["name"] for m in valid}
     moving = {m["name"] for m in valid if not all(map(_nothing, m["at"]))}
     kinds = [f"`{kind}`" for kind in SHOWN_BY]
+    free = [name for name in deciding if name in names - moving]
     return CHANGES.format(
+        count=len(free),
         cases=f"{', '.join(kinds[:-1])} or {kinds[-1]}",
         changes="".join(map(_changed, valid)),
-        free=_names([name for name in deciding if name in names - moving]),
+        free=_names(free),
         left=_left(valid),
-        open=_open([name for name in deciding if name not in names]),
+        open=_open([name for name in deciding if name not in names], len(names), len(free)),
     )
 
 
@@ -268,8 +279,10 @@ def _names(names: Sequence[str]) -> str:
     return textwrap.fill(listed, 130, break_long_words=False)
 
 
-def _open(names: Sequence[str]) -> str:
-    return f"Not measured, or at another value:\n{_names(names)}.\n" if names else "Every number that decides is measured.\n"
+def _open(missing: Sequence[str], count: int, free: int) -> str:
+    if missing:
+        return f"Not measured, or at another value:\n{_names(missing)}.\n"
+    return MOVED.format(all=count, shown=count - free, free=free)
 
 
 def _head() -> str:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from gaident.arguments import NO_TIME, arg
 from gaident.axis import Text, say
 from gaident.data.clock import axis_of, clock_of, common_clock, part_of, second_of
-from gaident.data.column_score import LEAST, spoken_for
+from gaident.data.column_score import spoken_for
 from gaident.data.counters import Counters
 from gaident.data.formats.table import Column, LogTable
 from gaident.data.record import CHANNELS, Record
@@ -25,6 +25,7 @@ from gaident.data.torque_kind import COMMANDED, MEASURED, kind_of_torque
 from gaident.data.wanted import Wanted, si_factor
 from gaident.data.winding_torque import ELECTRICAL, torque_of_winding
 from gaident.errors import ReadError, RecordError
+from gaident.policy.table import POLICY
 
 __all__ = ["assemble", "channels_of"]
 
@@ -122,7 +123,7 @@ def _unnamed_torque(table: LogTable, wanted: Wanted, named: dict[str, Column]) -
     found = [
         min((column.key, *column.names), key=len)
         for column in free
-        if spoken_for((column.key, *column.names), column.unit, "torque")[0] >= LEAST
+        if spoken_for((column.key, *column.names), column.unit, "torque")[0] >= POLICY.words_needed
     ]
     if not found:
         return []

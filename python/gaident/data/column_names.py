@@ -15,10 +15,10 @@ from gaident.data.column_words import (
     UNSURE_WORDS,
     words_of,
 )
+from gaident.policy.table import POLICY
 
 __all__ = ["NameSays", "name_says"]
 
-_LETTER = 2  # no decision: how much a single letter speaks for a quantity
 _BETWEEN = re.compile(r"[/!]|::|\.(?!\s)")  # what separates the parts of a path
 _BRACKET = re.compile(r"\[[^\]]*\]?")  # [rad/s], [0]
 _FIELD_CURRENT = frozenset(("current", "strom"))  # beside d: the current that forms the field
@@ -98,7 +98,7 @@ def _quantities(words: list[str], letters: bool, said: bool) -> dict[str, int]:
         quantity: max((known.get(word, 0) for word in words if word != "f" or said), default=0)
         for quantity, known in QUANTITY_WORDS.items()
     }
-    return {quantity: much for quantity, much in found.items() if much > (0 if letters else _LETTER)}
+    return {quantity: much for quantity, much in found.items() if much > (0 if letters else POLICY.letter_points)}
 
 
 def _without_unit(name: str, unit: str | None) -> str:

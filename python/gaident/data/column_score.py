@@ -7,12 +7,12 @@ from collections.abc import Sequence
 from gaident.data.column_names import name_says
 from gaident.data.formats.units import Constants, factor, is_any_unit
 from gaident.errors import ReadError
+from gaident.policy.table import POLICY
 
-__all__ = ["COMMANDED_QUANTITY", "LEAST", "spoken_for"]
+__all__ = ["COMMANDED_QUANTITY", "spoken_for"]
 
 COMMANDED_QUANTITY = {"command": "velocity", "position_command": "position"}
 """Channel that is a command -> the quantity that it commands."""
-LEAST = 2  # no decision: words that speak for a column
 
 
 def spoken_for(names: Sequence[str], unit: str | None, channel: str) -> tuple[int, str, bool]:
@@ -23,11 +23,11 @@ def spoken_for(names: Sequence[str], unit: str | None, channel: str) -> tuple[in
     elsewhere = unit is not None and not fits and not _converts(unit, quantity) and is_any_unit(unit)
     if said.foreign or elsewhere or not (by_name or fits):
         return 0, "", False
-    if max((much for other, much in said.quantities.items() if other != quantity), default=0) > max(by_name, LEAST):
+    if max((much for other, much in said.quantities.items() if other != quantity), default=0) > max(by_name, POLICY.words_needed):
         return 0, "", False  # the set value of a position is no velocity command
-    score = by_name + (3 if fits else 0)
+    score = by_name + (POLICY.unit_points if fits else 0)
     if channel in COMMANDED_QUANTITY:
-        score = score + 3 if said.commanded else 0
+        score = score + POLICY.command_points if said.commanded else 0
     elif channel in ("velocity", "position"):
         score = 0 if said.commanded else score + (1 if said.measured else 0)  # a command is no measurement, whatever its unit
     else:

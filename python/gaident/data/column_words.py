@@ -9,6 +9,8 @@ import re
 import unicodedata
 from functools import cache
 
+from gaident.policy.table import POLICY
+
 __all__ = [
     "COMMAND_WORDS",
     "FOREIGN_WORDS",
@@ -89,7 +91,6 @@ _IDN = re.compile(r"\b[SP](?:-\d+){2,}")  # S-0-0040 by itself
 _CAPITAL = re.compile(r"([^\W\d_A-Z])([A-Z])")
 _TYPE_PREFIX = re.compile(r"\b(?:f|lr)(?=[A-Z][a-z])")  # fActVelo, lrSetVelocity: a program's mark for the type of a number
 _JOINTS = ("", "s", "en")  # Geschwindigkeit-s-sollwert, Moment-en-sollwert
-_LETTERS = 3  # no decision: shorter words would be found in any name
 
 
 def words_of(name: str) -> list[str]:
@@ -115,7 +116,7 @@ def _known() -> frozenset[str]:
     """Words that a compound may be made of."""
     quantities = (word for words in QUANTITY_WORDS.values() for word in words)
     return frozenset(
-        w for w in (*quantities, *COMMAND_WORDS, *MEASURED_WORDS, *FOREIGN_WORDS, *UNSURE_WORDS) if len(w) >= _LETTERS
+        w for w in (*quantities, *COMMAND_WORDS, *MEASURED_WORDS, *FOREIGN_WORDS, *UNSURE_WORDS) if len(w) >= POLICY.least_letters
     )
 
 
@@ -124,7 +125,7 @@ def _parts(word: str) -> tuple[str, ...]:
     """The known words that a word is made of, without a rest, the longest first; () where there are none."""
     if word in _known():
         return (word,)
-    for end in range(len(word) - _LETTERS, _LETTERS - 1, -1):
+    for end in range(len(word) - POLICY.least_letters, POLICY.least_letters - 1, -1):
         first = word[:end]
         if first not in _known():
             continue

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from gaident.data.column_score import LEAST, spoken_for
+from gaident.data.column_score import spoken_for
 from gaident.data.formats.units import factor
 from gaident.data.listing import ColumnInfo, Listing
 from gaident.data.record import CHANNELS
@@ -40,9 +40,9 @@ def guess_channels(listing: Listing) -> Guess:
     for column in usable:
         for channel in CHANNELS:
             score, reason, unsure = spoken_for((column.name, *column.names), column.unit, channel)
-            if score >= LEAST and unsure:
+            if score >= POLICY.words_needed and unsure:
                 asked[channel].append(column)
-            elif score >= LEAST:
+            elif score >= POLICY.words_needed:
                 scored[channel].append((score, column, reason))
     channels: dict[str, ColumnInfo] = {}
     reasons: dict[str, str] = {}

@@ -27,6 +27,7 @@ from gaident.data.record import Record
 from gaident.errors import RecordError
 from gaident.models.model import Model
 from gaident.models.simulate import Run, run
+from gaident.policy.table import POLICY
 from gaident.results.frequency import FrequencyResponse, Responses
 
 __all__ = ["measured_response", "response_of", "sampled_response", "simulated_response"]
@@ -34,10 +35,9 @@ __all__ = ["measured_response", "response_of", "sampled_response", "simulated_re
 Vector = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
-WINDOWS = 8  # no decision: at least, half-overlapping
-LONGEST = 4096  # no decision: samples of a window
+WINDOWS = 8  # no decision: at least, half-overlapping: the resolution of a spectrum, and its deviations are reckoned with it
+LONGEST = 4096  # no decision: samples of a window: the resolution of a spectrum, and its deviations are reckoned with it
 PER_OCTAVE = 12  # no decision: frequencies kept
-CHANCE = 0.05  # no decision: of a coherence above `threshold` where there is none
 
 SAME = np.array([1.0, 4.0 / 9.0, 1.0 / 36.0])  # no decision: of a Hann window
 NEXT = np.array([1.0 / 36.0, (4.0 / (9.0 * np.pi)) ** 2, 1.0 / 144.0, (4.0 / (45.0 * np.pi)) ** 2])  # no decision: Hann
@@ -156,7 +156,7 @@ def _estimate(u: Vector, w: Vector, command: Vector | None, dt: float) -> Freque
     known = np.isfinite(value) & np.isfinite(coherence)
     frequency = np.add.reduceat(f, first) / count
     with np.errstate(divide="ignore"):
-        threshold = 1.0 - CHANCE ** (1.0 / np.maximum(averages - 1.0, 0.0))
+        threshold = 1.0 - POLICY.coherence_level ** (1.0 / np.maximum(averages - 1.0, 0.0))
     return FrequencyResponse(
         frequency=frequency[known],
         value=value[known],

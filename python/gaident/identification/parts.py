@@ -59,7 +59,7 @@ def _window(rec: Record, controller: PI | None, moving: bool, length: int) -> tu
     spread = np.maximum(over[2] - over[1] ** 2 / (block * POLICY.grid), 0.0)
     score = _relative(over[0]) + _relative(spread)
     best = int(np.argmax(score))
-    if not moving and score[0] >= 0.5 * score[best]:  # no decision: which part of a record is searched first
+    if not moving and score[0] >= POLICY.from_rest * score[best]:
         best = 0
     start = best * block
     return float(np.var(rec.velocity[start : start + length])), start, start + length

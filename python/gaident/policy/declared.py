@@ -15,13 +15,16 @@ __all__ = [
     "ENCODER",
     "FORMS",
     "GAIN",
+    "HEADERS",
     "LAGS",
     "LOOP",
     "NOISE",
     "PERIODS",
     "PROFILES",
+    "PROPOSALS",
     "REAL",
     "REGRESSION",
+    "RESPONSES",
     "SAMPLED",
     "SHIFTED",
     "SHORT",
@@ -29,11 +32,13 @@ __all__ = [
     "SHOWN_BY",
     "SLOWER",
     "SUCCESS",
+    "UNLOGGED",
     "WINDING",
     "calibrated",
     "cause",
     "check",
     "effort",
+    "experiment",
     "gain",
     "linear",
     "loop",
@@ -64,9 +69,14 @@ AHEAD = "ahead"
 SAMPLED = "sampled"
 SHORT_MOVES = "short_moves"
 LAGS = "lags"
+PROPOSALS = "proposals"
+UNLOGGED = "unlogged"
+RESPONSES = "responses"
+HEADERS = "headers"
 SHOWN_BY = (
     *(DRIVES, SHORT, LOOP, SLOWER, SHIFTED, REAL, REGRESSION, SUCCESS, WINDING, FORMS, LOGS),
     *(ENCODER, PERIODS, PROFILES, AHEAD, SAMPLED, SHORT_MOVES, LAGS),
+    *(PROPOSALS, UNLOGGED, RESPONSES, HEADERS),
 )
 
 GAIN = "Is the gain enough?"
@@ -77,6 +87,7 @@ CONTROLLER = "Does the logged torque follow from the controller?"
 READING = "How is a log read?"
 RECORD = "What does a record show?"
 LINEAR = "Which linear model?"
+EXPERIMENTS = "What may an experiment ask of the axis?"
 EFFORT = "Effort"
 
 
@@ -122,6 +133,10 @@ def record(value: float, unit: str, source: str, cases: str) -> Any:
 
 def linear(value: float, unit: str, source: str, cases: str) -> Any:
     return _row(LINEAR, value, unit, source, cases)
+
+
+def experiment(value: float, unit: str, source: str) -> Any:
+    return _row(EXPERIMENTS, value, unit, source, PROPOSALS)
 
 
 def effort(value: float, unit: str, source: str) -> Any:

@@ -1,6 +1,7 @@
 """Effort: budgets that bound the work of a search or a fit, with unit and what each is for. The last group of the policy.
 
 More of these may find more, and changes no decision about what was found. So no command measures a row of its own.
+`hope`, `part_reach` and `slow_fall` prune: what they leave out is never fitted to the end, and may be what would have been found.
 Searches and fits that need the same effort share a row.
 """
 
@@ -43,6 +44,10 @@ class Effort:
     whole_record: int = effort(30, "iterations", "of a fit to all samples that starts from the fit to a part of them")
     filter_fit: int = effort(40, "iterations", "of a fit of a controller's filters from a point of a grid")
     final: int = effort(60, "iterations", "of the last fit, of the model or of the controller, whose numbers are told")
+    led: int = effort(
+        3, "runs", "of the loop that leads a model along a motion; what one misses is added to the command of the next"
+    )
+    led_steps: int = effort(200, "steps", "of that loop in 1/cutoff: its bandwidth is 0.4 * 200/(2 pi) = 13 times the cutoff")
     regressions: int = effort(50, "regressions", "of a discrete model, each filtered by the noise model of the one before")
     evolution: int = effort(50, "generations", "of a global search beside stops and impacts")
     deepenings: int = effort(12, "searches", "of that kind near the model that was selected, until they gain no more")
@@ -77,6 +82,9 @@ class Effort:
     searched_samples: int = effort(
         1 << 13, "samples", "of all records in which a model, or a controller's numbers, are searched; a window has half of them"
     )
+    from_rest: float = effort(
+        0.5, "1", "of the excitation of the best window, from which one that starts at rest is searched in its place"
+    )
     searched_share: int = effort(64, "1", "samples of long records, of which a model is searched in one")
     most_samples: int = effort(
         1 << 16, "samples", "in which a model is searched at most, or to which a law of the torque is fitted"
@@ -87,4 +95,6 @@ class Effort:
     tuned_samples: int = effort(30_000, "samples", "of a record, to which noise and walk of a missing torque are fitted")
     enough_samples: int = effort(3500, "samples", "of a search on a coarser grid")
     proposed_samples: int = effort(4000, "samples", "of a proposed record at least, where the diagnosed one is shorter")
+    sampled_lines: int = effort(200, "lines", "of a log about, by which delimiter and decimal mark are found")
+    sampled_bytes: int = effort(400, "bytes", "of a log, in which letters of 16 bits are looked for")
     head: int = effort(200, "samples", "from whose velocity the start of a model in motion is fitted")

@@ -5,11 +5,14 @@ A decision is never made by a number that stands elsewhere: `tests/python/projec
 Numbers that follow from records without effects are calibrated: `python bench/blind.py --calibrate` writes them into
 `calibrated.json`, which is read here. The others are set by hand, for the reason that their row gives.
 
+Three groups stand in modules of their own: what a record shows (`records.py`), which linear model holds and in which band a
+regression looks (`linear.py`), what a proposed experiment may ask of the axis (`experiments.py`).
+
 Effort is the last group (`effort.py`): what bounds the work of a search or a fit, such as iterations, starts, points of a grid,
 samples that are looked at. More of it may find more, and changes no decision about what was found.
 
 Other modules keep numbers that decide nothing and bound no search, each with a name in capitals or a comment
-`# no decision: why`:
+`# no decision: why`. One that is compared or bounds looks like a number that decides, and says why in these words or a sentence:
 
 - "a start": a value from which one fit begins, or the ends of a grid of them; how many there are is effort.
   The bounds and starts of an effect's parameters stand in its row of the library.
@@ -29,41 +32,43 @@ from typing import NamedTuple
 from gaident.policy.declared import (
     AHEAD,
     DRIVES,
-    ENCODER,
     FORMS,
     GAIN,
+    HEADERS,
     LAGS,
-    LOOP,
     NOISE,
     PERIODS,
     PROFILES,
     REAL,
-    REGRESSION,
+    RESPONSES,
     SAMPLED,
     SHIFTED,
     SHORT,
     SHORT_MOVES,
     SLOWER,
-    SUCCESS,
-    WINDING,
+    UNLOGGED,
     calibrated,
     cause,
     check,
     gain,
-    linear,
     loop,
     noise,
     reading,
-    record,
 )
 from gaident.policy.effort import Effort
+from gaident.policy.experiments import Experiments
+from gaident.policy.linear import LinearModels
+from gaident.policy.records import Records
 
 __all__ = ["POLICY", "Decisions", "Policy", "PolicyRow", "rows"]
 
 
 @dataclass(frozen=True)
 class Decisions:
-    """The numbers that decide, in the order of the questions that they answer."""
+    """The numbers that decide, in the order of the questions that they answer.
+
+    The last questions have modules of their own: `records.py`, `linear.py`, `experiments.py`.
+    """
 
     # Is the gain enough? One criterion: BIC and a penalty for each effect, which stands for the number of candidates tried.
     effect_penalty: float = calibrated(
@@ -125,6 +130,31 @@ class Decisions:
         0.02, "1", "part of the linear model's squared error beyond the noise that lies between the lines of a coarser grid", REAL
     )
     swings: float = noise(0.5, "1", "sum of rho^2 of errors, from which they swing where it is above the sum of rho", REAL)
+
+    direction_samples: int = noise(
+        8,
+        "samples",
+        "of a record, for each direction that is taken out of its error before the score test fits a noise filter",
+        DRIVES,
+    )
+
+    # The free functions of each driver in the test for dependence: how fine they are decides which driver explains most.
+    function_samples: int = noise(16, "samples", "of a record, for each function of a driver's family", SHORT)
+    least_functions: int = noise(4, "1", "functions of a driver's family at least, for which any record has room", SHORT)
+    function_knots: int = noise(8, "1", "knots of a free function of torque or command, at quantiles", DRIVES)
+    angle_knots: int = noise(6, "1", "the same of the angle, beside which harmonics of a turn stand", DRIVES)
+    slow_knot: float = noise(
+        0.01,
+        "1",
+        "of the highest speed, the first knot of a function of the velocity; the others are multiples: 4, 12, 30, 60",
+        DRIVES,
+    )
+    path_widths: int = noise(6, "1", "widths at which elements that depend on the past path yield", DRIVES)
+    least_width: float = noise(3e-4, "1", "of the travel, the least of these widths: presliding and the play of a drive", DRIVES)
+    most_width: float = noise(0.3, "1", "the same, the greatest: a wider one yields in few strokes", DRIVES)
+    coherence_level: float = noise(
+        0.05, "probability", "with which a coherence is reached by chance: points below that coherence are not shown", RESPONSES
+    )
 
     # Is a finding a cause, or does it only describe what the library does not contain?
     of_its_size: float = cause(0.25, "1", "part of a finding's gain that a free function beside it may still find", DRIVES)
@@ -242,6 +272,7 @@ class Decisions:
     slowest_lag: float = loop(
         100.0, "samples", "time constant at most of a lag behind the controller's torque; a current loop is faster", LAGS
     )
+    fastest_lag: float = loop(0.05, "samples", "time constant at least of that lag: no log tells a shorter one from none", LAGS)
     lag_said: float = loop(0.75, "samples", "from which a lag of an open loop's log is said; a sampled torque's is 0.5", SHIFTED)
     observer_share: float = loop(0.3, "1", "of the controller that holds a model with a gap near its record", DRIVES)
     kept_correlation: float = loop(0.5, "1", "of the correlations of a controller's numbers from a slow log", SLOWER)
@@ -259,6 +290,17 @@ class Decisions:
     near_rounding: float = loop(
         1.1, "1", "of what rounding makes of a replay: filters that leave no more need no other filter beside them", FORMS
     )
+    notch_highest: float = loop(
+        0.95, "1", "of half the sampling frequency: at a higher one a notch of an unlogged controller is not looked for", UNLOGGED
+    )
+    form_slowest: float = loop(
+        0.1,
+        "1",
+        "of a record's duration: a longer time constant, or period of a notch, of an unlogged controller shows too rarely",
+        UNLOGGED,
+    )
+    notch_least_damping: float = loop(0.05, "1", "of the denominator of a drive's notch, where no torque is logged", UNLOGGED)
+    notch_most_damping: float = loop(2.0, "1", "the same at most: beyond, a notch is two low passes far apart", UNLOGGED)
     negligible: float = loop(1e-3, "1", "of a signal's largest value or range: less is 0, or the rounding of a log")
 
     # How is a log read? What a file does not say is refused or asked; these say where it is clear.
@@ -275,6 +317,7 @@ class Decisions:
     wrap_beside: float = reading(0.25, "1", "of that jump: the steps beside it are shorter")
     wrap_alike: float = reading(0.05, "1", "of that jump, by which the steps before and behind it differ at most")
     wrap_steady: float = reading(0.5, "1", "least ratio of the steps before and after a wrap, the shorter one to the longer one")
+    wrap_reach: int = reading(8, "samples", "on either side of a jump, in which a slow motion shows its direction")
     wrap_spared: float = reading(0.999, "1", "of the steps are no jumps then; the rest may be lost samples")
     overlap: float = reading(0.3, "1", "of the shorter of two logs, that both have at least")
     aligned: float = reading(0.5, "1", "correlation of two logs of one motion at least")
@@ -283,86 +326,24 @@ class Decisions:
     )
     rate_seen: float = reading(3.0, "1", "standard deviations from 0, from which two clocks run at different rates")
 
-    # What does a record show? What is spoiled in it, and what it could not have shown.
-    least_samples: int = record(
-        100, "samples", "length of a record at least: below, noise filter and linear model use up what it knows", SHORT
+    words_needed: int = reading(
+        2, "points", "that have to speak for a column by its name and unit, to take it for a channel", HEADERS
     )
-    one_course: float = record(0.9, "1", "correlation of command and velocity, from which one follows the other", SUCCESS)
-    same_unit: float = record(3.0, "1", "factor between the two then, up to which they have the same unit", SUCCESS)
-    near_rpm: float = record(1.25, "1", "factor within which their ratio is that of rpm to rad/s: one of them is in rpm", SUCCESS)
-    repeats: float = record(0.9, "1", "share of differences that are not 0: below, a velocity is quantised", DRIVES)
-    rest_steps: float = record(1.5, "steps", "of that quantisation: a first velocity above is no rest", DRIVES)
-    rest_share: float = record(0.6, "1", "of the first command: a first velocity up to it is the response from rest", SUCCESS)
-    outlier_far: float = record(9.0, "1", "standard deviations from its neighbours, from which a sample may be an outlier", LOOP)
-    outlier_missed: float = record(0.4, "1", "of that distance, by which the lines from either side, and a model, miss it", LOOP)
-    outlier_alone: float = record(0.5, "1", "of that distance: where two samples near by are as far off, the axis rings", LOOP)
-    sensor_step: float = record(1e-4, "1", "of the velocity's range: a finer quantisation is that of a text log", DRIVES)
-    on_lattice: float = record(0.1, "steps", "from the places of a lattice, within which all values lie on it", DRIVES)
-    whole_lines: float = record(0.01, "1", "lines of a turn, within which an encoder's number of lines is whole", DRIVES)
-    fewest_lines: int = record(100, "1", "lines of a turn that an encoder of a drive has at least", ENCODER)
-    binary_lines: float = record(1e-4, "1", "share of a power of two, within which an encoder's lines are that", ENCODER)
-    folded_steep: float = record(0.15, "1", "of the 95 % quantile of slopes: a turning point with less is a rest", REAL)
-    folded_smoother: float = record(
-        0.8, "1", "of the curvature at a turning point: below, the signal is smoother with its sign turned there", REAL
+    unit_points: int = reading(3, "points", "of a unit that is one of the channel's quantity", HEADERS)
+    command_points: int = reading(3, "points", "of a word for a command, as much as of a unit: a command is called so", HEADERS)
+    letter_points: int = reading(
+        2, "points", "of a single letter (n, M, i); behind a path's other words it says nothing", HEADERS
     )
-    folded_points: int = record(3, "1", "such points, from which a speed has lost its sign; one or two may be chance", REAL)
-    above_noise: float = record(6.0, "1", "standard deviations of a signal's noise, beyond which it is not 0", DRIVES)
-    still: float = record(0.02, "1", "of a signal's largest value or range: within, it holds a value, or is 0", DRIVES)
-    apart: float = record(0.05, "1", "of the highest speed, by which two speeds or jumps differ", DRIVES)
-    slow: float = record(0.1, "1", "of the highest speed or torque: below, it is a slow or a small one", DRIVES)
-    held_samples: int = record(20, "samples", "for which a speed is held at least", DRIVES)
-    no_ramp: float = record(0.35, "1", "of the band of a held speed, by which its halves differ at most; on a ramp 0.5", DRIVES)
-    seen_turn: float = record(0.75, "1", "of a period, that a record turns at least to show what returns once in it", DRIVES)
-    seen_periods: float = record(2.0, "periods", "in the travel, of what returns more often; less is any curve", DRIVES)
-    seen_path: float = record(3.0, "periods", "that a record travels at least, there and back, to show an order", DRIVES)
-    seen_band: float = record(0.8, "1", "of half the sampling frequency: what is faster does not show", DRIVES)
-    gravity_turn: float = record(1 / 6, "turns", "of travel: below, a torque once per turn is a constant or a spring", REGRESSION)
-    swing_damping: float = record(0.5, "1", "damping ratio below which two masses swing as on a shaft", DRIVES)
-
-    # Which linear model holds? What identify() and inverse_dynamics() decide for themselves; a diagnosis starts from it.
-    test_level: float = linear(
-        1e-4, "probability", "of the tests that a linear model holds, that a replay leaves white noise", SUCCESS
+    least_letters: int = reading(
+        3, "letters", "of a known word that is looked for inside a longer one: shorter ones are in any", HEADERS
     )
-    undecided_ratio: float = linear(
-        2.0, "1", "rms of a residual over the noise: above, what is not white may hide a misfit", SUCCESS
-    )
-    cancellation: float = linear(0.02, "1", "of a zero's magnitude: a pole so close cancels it", SUCCESS)
-    contradiction: float = linear(
-        3.0, "1", "standard deviations by which numbers of a mechanism contradict each other, or a lag is not 0", SUCCESS
-    )
-    material_column: float = linear(
-        0.05, "1", "of the squared torque, that a spring or friction by direction explains", REGRESSION
-    )
-    lag_left: float = linear(
-        0.05,
-        "1",
-        "most of the torque's variance, or squared velocity, that the regression behind a lag leaves: more tells none",
-        SHIFTED,
-    )
-    lag_std: float = linear(
-        0.2, "samples", "standard deviation of a lag that the motion shows, at most; above, it shows none", SHIFTED
-    )
-    winding_sure: float = linear(5.0, "1", "standard deviations from 0, from which a resistance or inductance is shown", WINDING)
-    least_rows: int = linear(20, "1", "rows of a regression at least, half of them each way for dry friction", REGRESSION)
-    standing_noise: float = linear(
-        3.0, "1", "standard deviations of the velocity's noise, below which an axis stands still in a regression", REGRESSION
-    )
-    standing_share: float = linear(0.005, "1", "of the velocity's rms, below which it stands still there", REGRESSION)
-    both_ways: float = linear(0.02, "1", "of the rows in either direction at least, to tell dry friction from a load", REGRESSION)
-    spring_turns: float = linear(10.0, "turns", "of travel: beyond, no spring is fixed to the ground", REGRESSION)
-    another_mass: float = linear(
-        2.0,
-        "1",
-        "factor by which a further mass reduces the whitened error sum at least, where no linear structure holds",
-        DRIVES,
-    )
-    below_zero: float = linear(
-        2.0, "1", "standard deviations below 0, from which a mass or damping is said to be negative; nearer has no sign", SUCCESS
-    )
+    whole_rows: float = reading(0.9, "1", "of the lines made of digits: so many may have commas of both meanings", HEADERS)
+    odd_rows: float = reading(0.1, "1", "of these, of another width: so many, and the user is asked what the commas are", HEADERS)
+    wide_letters: float = reading(0.8, "1", "of every second byte that is 0: a text of 16 bits a letter (UTF-16)", HEADERS)
 
 
 @dataclass(frozen=True)
-class Policy(Effort, Decisions):
+class Policy(Effort, Experiments, LinearModels, Records, Decisions):
     """The whole table: first what decides, then effort. `rows()` lists all with unit, source and command."""
 
 

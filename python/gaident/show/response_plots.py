@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gaident.axis import said, unit, word
+from gaident.policy.table import POLICY
 from gaident.results.frequency import Responses
 from gaident.show.chart import Chart, Panel, Trace
 from gaident.show.draw import chart_figure
@@ -50,7 +51,8 @@ def response_chart(r: Responses, axis: str, hz: bool = True) -> Chart:
         phase.append(Trace(scale * s.frequency, phase_line(s.value), "", "extended", width=1.5))
     size.append(Trace(scale * r.fine, np.abs(r.model), "its linear part, exact", "linear", width=1.0, dash="dash"))
     phase.append(Trace(scale * r.fine, phase_line(r.model), "", "linear", width=1.0, dash="dash"))
-    chance = Trace(scale * m.frequency, m.threshold, "reached by chance, 1 of 20", "noise", dash="dash")
+    often = f"reached by chance, 1 of {1.0 / POLICY.coherence_level:.0f}"
+    chance = Trace(scale * m.frequency, m.threshold, often, "noise", dash="dash")
     none = "" if len(f) else "the record shows nothing here: its coherence is nowhere above chance"
     panels = (
         Panel(f"magnitude [{unit('rad/s/(N m)', axis)}]", tuple(size), log=True, height=1.6),

@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 from gaident.arguments import arg
 from gaident.data.formats.text import Line
 from gaident.errors import ReadError
+from gaident.policy.table import POLICY
 
 __all__ = ["Dialect", "detect", "parse_number", "split"]
 
@@ -23,7 +24,6 @@ _NUMBER = {
     # A digit must follow the comma, so that the separator in '1, 2' is none.
     ",": re.compile(rf"[+-]?(?:\d+(?:,\d+)?|,\d+){_EXPONENT}|{_SPECIAL}", re.IGNORECASE),
 }
-_SAMPLED = 200  # no decision: lines that tell the spelling of a file
 _LEADING_ZERO = re.compile(r"0\d+")
 
 
@@ -77,7 +77,7 @@ def detect(path: str, lines: Sequence[Line], delimiter: str | None, decimal: str
     delimiter  as the user says, or None; decimal likewise
     """
     half = lines[len(lines) // 2 :]
-    sample = [text for _, text in half[:: max(1, len(half) // _SAMPLED)]]
+    sample = [text for _, text in half[:: max(1, len(half) // POLICY.sampled_lines)]]
     best: Dialect | None = None
     best_score = (0.0, 0.0)
     for mark in _DELIMITERS if delimiter is None else (delimiter,):
@@ -138,16 +138,15 @@ def _look_further(lines: Sequence[Line], found: Dialect) -> Dialect:
 
 def _refuse_two_meanings(path: str, lines: Sequence[Line], half: Sequence[Line], found: Dialect) -> None:
     """`0,001,1,5`: is that four whole numbers or two with decimal commas? Then only the user knows."""
-    rows = [(number, split(text, ",")) for number, text in half[:: max(1, len(half) // _SAMPLED)]]
+    rows = [(number, split(text, ",")) for number, text in half[:: max(1, len(half) // POLICY.sampled_lines)]]
     whole = [(number, row) for number, row in rows if all(cell.lstrip("+-").isdigit() for cell in row)]
-    if 10 * len(whole) < 9 * len(rows):  # no decision: the spelling of a file: where it has two meanings the user is asked
+    if len(whole) < POLICY.whole_rows * len(rows):
         return
     names = next((split(text, ",") for _, text in reversed(lines[: len(lines) // 2]) if not _digits_only(text)), [])
     suspicious = [number for number, row in whole if any(_LEADING_ZERO.fullmatch(cell) for cell in row[1:])]
     other_widths = [number for number, row in whole if len(row) != found.width]
     half_named = len([name for name in names if name]) * 2 == found.width
-    # no decision: the spelling of a file: where it has two meanings the user is asked
-    if not suspicious and not half_named and 10 * len(other_widths) < len(whole):
+    if not suspicious and not half_named and len(other_widths) < POLICY.odd_rows * len(whole):
         return
     number = (suspicious or other_widths or [whole[0][0]])[0]
     text = next(text for n, text in half if n == number)

@@ -8,6 +8,7 @@ from collections.abc import Sequence
 
 from gaident.arguments import arg
 from gaident.errors import ReadError
+from gaident.policy.table import POLICY
 
 __all__ = ["Line", "check_text", "encoding_of", "lines_of"]
 
@@ -97,10 +98,10 @@ def _guess(raw: bytes) -> str | None:
         if raw.startswith(mark):
             return name
     # UTF-16 without a mark: digits and separators leave every second byte zero.
-    head = raw[:400]  # no decision: bytes that tell the spelling of a file
+    head = raw[: POLICY.sampled_bytes]
     even, odd = head[0::2].count(0), head[1::2].count(0)
-    if odd > 0.8 * len(head[1::2]) and even == 0:  # no decision: bytes that tell the spelling of a file
+    if odd > POLICY.wide_letters * len(head[1::2]) and even == 0:
         return "utf-16-le"
-    if even > 0.8 * len(head[0::2]) and odd == 0:  # no decision: bytes that tell the spelling of a file
+    if even > POLICY.wide_letters * len(head[0::2]) and odd == 0:
         return "utf-16-be"
     return None

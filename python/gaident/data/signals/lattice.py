@@ -11,10 +11,9 @@ __all__ = ["changes", "digits_step", "encoder_lines", "encoder_step", "lattice_s
 
 Vector = NDArray[np.float64]
 
-FEWEST = 4  # no decision: distinct values that a lattice could be told from chance by
 SAME = 1e-9  # no decision: of the largest value, the last digits of a float, in which two values are the same
-SPEEDS = (1.0, np.pi / 30.0, np.pi / 180.0, 2.0 * np.pi)  # no decision: units of a speed; rad/s in each: rad/s, rpm, deg/s, 1/s
-PLACES = (1.0, np.pi / 180.0, 2.0 * np.pi, 1e-3)  # no decision: units of positions: rad or m, degrees, turns, mm
+SPEEDS = (1.0, np.pi / 30.0, np.pi / 180.0, 2.0 * np.pi)  # no decision: a unit; rad/s in each: rad/s, rpm, deg/s, 1/s
+PLACES = (1.0, np.pi / 180.0, 2.0 * np.pi, 1e-3)  # no decision: a unit of positions: rad or m, degrees, turns, mm
 EXACT = 1e-4  # no decision: steps, what a decimal number is exact to in binary and scaled by ten
 
 DIGITS = range(1, 10)  # no decision: significant digits that text logs are written with; more round off nothing that matters
@@ -39,12 +38,12 @@ def lattice_step(values: Vector, rounded: bool = False) -> float:
     """
     distinct = np.unique(values)
     size = float(np.abs(distinct).max())
-    if len(distinct) < FEWEST or not size > 0.0:
+    if len(distinct) < POLICY.lattice_values or not size > 0.0:
         return 0.0
     gaps = np.sort(np.diff(distinct))
     within = POLICY.on_lattice * float(np.median(gaps)) if rounded else 0.0
     gaps = gaps[gaps > max(within, SAME * size)]
-    if len(gaps) < FEWEST - 1:
+    if len(gaps) < POLICY.lattice_values - 1:
         return 0.0
     step, reach = float(gaps[0]), 2.0
     while True:
@@ -120,7 +119,7 @@ def place_step(positions: Vector) -> float:
 def _last_digit(values: Vector) -> float:
     """Of the largest value, where all are written with the same number of significant digits; 0.0 where they are not."""
     size = np.abs(values[values != 0.0])
-    if len(size) < FEWEST:
+    if len(size) < POLICY.lattice_values:
         return 0.0
     exponent = np.floor(np.log10(size))
     for digits in DIGITS:

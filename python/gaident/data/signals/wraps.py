@@ -26,7 +26,6 @@ __all__ = ["Unwrapper", "overflow"]
 Vector = NDArray[np.float64]
 
 _USUAL = (1.0, 100.0, 360.0, 3600.0, 36000.0, 360000.0, 1000.0, 2.0 * math.pi, *(float(2**k) for k in range(8, 33)))
-_REACH = 8  # no decision: samples on either side in which a slow motion shows its direction; samples
 _INTEGERS = (float(2**16), float(2**32))  # of an integer that overflows
 
 
@@ -46,8 +45,8 @@ def _clean(x: Vector, usual: Sequence[float]) -> tuple[NDArray[np.intp], Vector]
     )
     # no decision: digits that a range is logged with
     known = np.array([any(abs(m - s) <= 1e-3 * m for m in usual) for s in size + lacking], dtype=bool)
-    came = sign * (x[at] - x[np.maximum(at - _REACH, 0)])
-    went = sign * (x[np.minimum(at + 1 + _REACH, len(x) - 1)] - x[at + 1])
+    came = sign * (x[at] - x[np.maximum(at - POLICY.wrap_reach, 0)])
+    went = sign * (x[np.minimum(at + 1 + POLICY.wrap_reach, len(x) - 1)] - x[at + 1])
     clean &= steady | (known & (came >= 0.0) & (went >= 0.0) & (came + went > 0.0))
     return at[clean], lacking[clean]
 

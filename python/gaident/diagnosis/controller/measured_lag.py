@@ -39,9 +39,8 @@ __all__ = ["Lag", "commanded", "lag_shown"]
 Vector = NDArray[np.float64]
 Matrix = NDArray[np.float64]
 
-SAMPLES_LATE = (0, 1)  # no decision: the ways in which a log is written
-FASTEST = 0.05  # no decision: samples, the fastest lag that is searched for; no log tells its pole of 2e-9 from 0
-POLE_STEP = 1e-4  # no decision: of a lag's pole, for a slope
+SAMPLES_LATE = (0, 1)  # no decision: a grid: the ways in which a log is written
+POLE_STEP = 1e-4  # no decision: the step of a difference, of a lag's pole
 NEAR = 1e-3  # no decision: of a range's end, within which a search stands at it
 
 
@@ -83,7 +82,7 @@ def lag_shown(records: Sequence[Record], controller: PI | None) -> Lag | None:
     if not all(noise) or least > min(_late(parts) - margin, _without(parts, controller) + margin):
         return None
     tau = -dt / float(np.log(a))
-    if not FASTEST * (1.0 + NEAR) < tau / dt < POLICY.slowest_lag * (1.0 - NEAR):
+    if not POLICY.fastest_lag * (1.0 + NEAR) < tau / dt < POLICY.slowest_lag * (1.0 - NEAR):
         return None
     step = POLE_STEP * (1.0 - a)
     slope = (np.concatenate(_left(parts, a + step, late)) - np.concatenate(left)) / step
@@ -181,7 +180,7 @@ def _fitted(parts: Sequence[_Part], late: int) -> tuple[float, list[Vector], int
     def pole(z: float) -> float:
         return float(np.exp(-np.exp(-z)))
 
-    ends = np.log(FASTEST), np.log(POLICY.slowest_lag)
+    ends = np.log(POLICY.fastest_lag), np.log(POLICY.slowest_lag)
     found = minimize_scalar(lambda z: _power(_left(parts, pole(z), late)), bounds=ends, method="bounded", options={"xatol": 1e-8})
     a = pole(float(found.x))
     return a, _left(parts, a, late), late

@@ -31,7 +31,6 @@ __all__ = ["Excitation", "decided_by_the_angle", "excitation", "position_of"]
 
 Vector = NDArray[np.float64]
 
-SMOOTHED, WINDOWS = 5, 400  # no decision: width of a moving average, samples and parts of a record
 TINY = 1e-300  # no decision: no division by 0
 
 
@@ -147,7 +146,7 @@ def _motion(rec: Record, controller: Controller | None, top: float) -> SeenMotio
     w = rec.velocity
     u = torque_of(rec, bare_pi(controller))
     floor = max(POLICY.above_noise * noise_std(w), POLICY.negligible * top, TINY)
-    smooth = _smoothed(w, max(SMOOTHED, len(w) // WINDOWS))
+    smooth = _smoothed(w, max(POLICY.smoothed_samples, len(w) // POLICY.smoothed_parts))
     moving = np.abs(smooth) > floor
     position = position_of(rec)
     command = rec.command

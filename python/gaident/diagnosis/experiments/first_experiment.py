@@ -38,10 +38,7 @@ __all__ = ["Limits", "MenuItem", "Proposal", "candidate_commands", "first_experi
 
 Vector = NDArray[np.float64]
 
-FREE = 0.9  # no decision: of speed and travel that commands use
-ROOM = 0.25  # no decision: of the speed limit, for the overshoot of ramps where kp is known
-AT_ONCE = 2  # no decision: samples of a jump; reversals have a sample of rest between
-LEAST_SAMPLES = 400  # no decision: that the shape of the command needs
+AT_ONCE = 2  # no decision: the samples that a jump takes by the shape of the commands: a reversal has a sample of rest between
 
 
 @dataclass(frozen=True, eq=False)
@@ -178,9 +175,9 @@ def limits_of(records: Record | Sequence[Record], controller: PI | None = None, 
     if controller is not None and controller.torque_limit is not None:
         torque = controller.torque_limit
     return Limits(
-        speed=max((float(np.abs(r).max()) for r in asked), default=0.0) / FREE,
+        speed=max((float(np.abs(r).max()) for r in asked), default=0.0) / POLICY.used_share,
         torque=torque,
-        travel=math.inf if checked_axis(axis) == "rotary" and travel >= math.tau else travel / FREE,
+        travel=math.inf if checked_axis(axis) == "rotary" and travel >= math.tau else travel / POLICY.used_share,
         duration=max((rec.duration for rec in listed), default=0.0),
     )
 
@@ -191,26 +188,25 @@ def _bench(dt: float, limits: Limits, inertia: float | None, kp: float | None) -
     for name, value in (("dt", dt), ("inertia", inertia), ("kp", kp)):
         if value is not None and not real_number(value, name, SettingsError, "give one number > 0") > 0.0:
             raise SettingsError(f"{name} is {value!r}: give one number > 0")
-    if limits.duration < LEAST_SAMPLES * dt:
-        raise SettingsError(
-            f"duration is {limits.duration:g} s, {int(limits.duration / dt)} samples: give {LEAST_SAMPLES * dt:g} s or more"
-        )
-    stroke = FREE * limits.travel
-    speed = min(FREE * limits.speed, stroke / (20.0 * dt))  # a stroke lasts 20 samples at least
+    least = POLICY.least_command * dt
+    if limits.duration < least:
+        raise SettingsError(f"duration is {limits.duration:g} s, {int(limits.duration / dt)} samples: give {least:g} s or more")
+    stroke = POLICY.used_share * limits.travel
+    speed = min(POLICY.used_share * limits.speed, stroke / (POLICY.stroke_samples * dt))
     top, slope = _ramps(limits, inertia, kp)
     # Half a stroke to rise, half to fall: v^2 = slope * stroke.
-    speed = min(speed, 0.8 * math.sqrt(slope * stroke)) if math.isfinite(stroke) else speed
+    speed = min(speed, POLICY.ramped_stroke * math.sqrt(slope * stroke)) if math.isfinite(stroke) else speed
     return Bench(dt, speed, min(speed, top), stroke, slope, limits.duration, limits.torque, kp)
 
 
 def _ramps(limits: Limits, inertia: float | None, kp: float | None) -> tuple[float, float]:
     """(speed to go to [rad/s], slope [rad/s^2]): speed + J a / kp <= speed limit, J a <= 60 % of the torque."""
     if kp is not None and inertia is not None:
-        torque = min(0.6 * limits.torque, kp * ROOM * limits.speed)
-        return min(FREE * limits.speed, limits.speed - torque / kp), torque / inertia
+        torque = min(POLICY.ramp_torque * limits.torque, kp * POLICY.overshoot_room * limits.speed)
+        return min(POLICY.used_share * limits.speed, limits.speed - torque / kp), torque / inertia
     # What is not known is left to time: a ramp takes a share of the record's, with kp a longer one to a lower speed.
-    top, hurry = (FREE, 150.0) if kp is None else (1.0 - ROOM, 100.0)
-    slope = hurry * top * limits.speed / limits.duration if inertia is None else 0.6 * limits.torque / inertia
+    top, hurry = (POLICY.used_share, POLICY.ramp_hurry) if kp is None else (1.0 - POLICY.overshoot_room, POLICY.ramp_hurry_kp)
+    slope = hurry * top * limits.speed / limits.duration if inertia is None else POLICY.ramp_torque * limits.torque / inertia
     return top * limits.speed, slope
 
 
@@ -222,8 +218,8 @@ def _filled(build: Builder, bench: Bench) -> Vector:
         if len(pattern) <= room:
             break
         # Ramps of a heavy axis take their time whatever the dwell: lower speeds are reached sooner.
-        slower = 1.0 if attempt < 10 else 0.9
-        bench = replace(bench, seconds=0.85 * bench.seconds, speed=slower * bench.speed, top=slower * bench.top)
+        slower = 1.0 if attempt < POLICY.slower_after else POLICY.slower_again
+        bench = replace(bench, seconds=POLICY.shorter_again * bench.seconds, speed=slower * bench.speed, top=slower * bench.top)
         pattern = build(bench)
     return np.tile(pattern, max(1, room // len(pattern)))[: max(room, 1)]
 

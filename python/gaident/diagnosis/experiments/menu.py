@@ -12,12 +12,11 @@ from numpy.typing import NDArray
 from gaident.axis import Text, say
 from gaident.diagnosis.experiments.commands import dithered, rest, strokes, triangles
 from gaident.diagnosis.library.terms import excited
+from gaident.policy.table import POLICY
 
 __all__ = ["MENU", "Bench", "Builder", "prbs_moving", "reversals", "slow_stairs", "speed_ladder", "steps"]
 
 Vector = NDArray[np.float64]
-
-ASKED = 0.8  # no decision: of the torque: what kp times a jump asks for; the rest is for the integral
 
 
 @dataclass(frozen=True)
@@ -39,7 +38,7 @@ class Bench:
     @property
     def jump(self) -> float:
         """Largest jump of the command [rad/s]; inf: kp is not known."""
-        return math.inf if self.kp is None else ASKED * self.torque / self.kp
+        return math.inf if self.kp is None else POLICY.jump_torque * self.torque / self.kp
 
 
 Builder = Callable[[Bench], Vector]

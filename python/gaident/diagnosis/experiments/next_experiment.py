@@ -49,9 +49,6 @@ __all__ = ["propose"]
 
 Vector = NDArray[np.float64]
 
-ROOM = 0.9  # no decision: of the torque, what a smaller command is made for
-RAMP = 0.6  # no decision: of the torque, what the ramps of a path ask for
-
 
 def _listed(effects: Sequence[str]) -> Text:
     """'a, b and c', as people write the names."""
@@ -102,7 +99,7 @@ class _Bench:
                 return item
             if not np.isfinite(most):
                 return None
-            item = item.scaled(ROOM * torque / most)
+            item = item.scaled(POLICY.used_share * torque / most)
         return None
 
     def left(self, record: Record, rival: Fit, refitted: bool) -> float:
@@ -208,7 +205,7 @@ def menu(data: DataSet, fit: Fit) -> list[MenuItem]:
     except GaidentError:
         return []  # nothing moves, or nothing may
     if data.controller.driven_by == "position_command":
-        return [item.along_a_path(RAMP * limits.torque / inertia) for item in items]
+        return [item.along_a_path(POLICY.ramp_torque * limits.torque / inertia) for item in items]
     return items
 
 

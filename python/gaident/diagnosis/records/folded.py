@@ -27,8 +27,7 @@ ADVICE = say(
     "{torque} stays as it is, so that the direction of motion is not known; log a signed velocity, or the position."
 )
 
-WINDOW = 5  # no decision: samples around a turning point
-USUAL = 0.95  # no decision: quantile of the slopes that stands for a usual motion
+WINDOW = 5  # no decision: the samples that two slopes and a curvature on either side of a turning point take
 
 
 def folded(rec: Record) -> bool:
@@ -40,7 +39,8 @@ def folded(rec: Record) -> bool:
     around = np.lib.stride_tricks.sliding_window_view(w, WINDOW)
     # no decision: slopes over two samples
     before, after = 0.5 * (around[:, 2] - around[:, 0]), 0.5 * (around[:, 4] - around[:, 2])
-    steep = max(POLICY.folded_steep * float(np.quantile(np.abs(np.diff(w)), USUAL)), POLICY.above_noise * noise_std(w))
+    usual = float(np.quantile(np.abs(np.diff(w)), POLICY.usual_slope))
+    steep = max(POLICY.folded_steep * usual, POLICY.above_noise * noise_std(w))
     turning = (before < -steep) & (after > steep) & (around[:, 2] <= np.minimum(around[:, 1], around[:, 3]))
     held = np.ptp(np.lib.stride_tricks.sliding_window_view(u[:-1], WINDOW - 1), axis=1) < POLICY.still * float(np.ptp(u))
     # The sign changes just before or just after the lowest sample.

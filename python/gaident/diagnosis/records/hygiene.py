@@ -18,10 +18,9 @@ Vector = NDArray[np.float64]
 
 ROBUST = 1.4826  # no decision: median absolute deviation of normal noise -> standard deviation
 SECOND = 1.5  # no decision: sqrt(14/6), noise of the line through two samples before over that through the two next ones
-NEAR = 8  # no decision: samples on either side that an outlier stands out of, the reach of a filter's ringing
-SHORTEST = 7  # no decision: samples that all these differences need
+SHORTEST = 7  # no decision: the fewest samples of which all of these differences can be taken at all
 DIVERGED = 1e6  # no decision: of the velocity; a simulation that leaves so much has diverged
-PASSES = 4  # no decision: neighbours hide each other, no more than four in a row
+PASSES = 4  # no decision: neighbours hide each other, no more than four in a row; passes end where none is new
 
 
 def left_out(rec: Record, model: Model, controller: PI | None) -> NDArray[np.intp]:
@@ -66,8 +65,9 @@ def _leaving(w: Vector, error: Vector | None) -> NDArray[np.intp]:
     if error is not None:
         left &= np.sign(middle) * _middle(error) > POLICY.outlier_missed * size
     found = np.flatnonzero(left)
-    around = np.lib.stride_tricks.sliding_window_view(np.pad(size, NEAR), 2 * NEAR + 1)[found]
-    beside = np.abs(np.arange(-NEAR, NEAR + 1)) <= 2  # where the outlier itself shows
+    near = POLICY.outlier_reach
+    around = np.lib.stride_tricks.sliding_window_view(np.pad(size, near), 2 * near + 1)[found]
+    beside = np.abs(np.arange(-near, near + 1)) <= 2  # where the outlier itself shows
     largest = size[found] >= around[:, beside].max(axis=1)
     alone = np.sum(around[:, ~beside] > POLICY.outlier_alone * size[found, None], axis=1) < 2  # where much is as rough it rings
     kept: NDArray[np.intp] = found[largest & alone] + 2

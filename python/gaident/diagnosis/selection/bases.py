@@ -25,7 +25,7 @@ from gaident.estimation.prediction import ClosedLoop, OpenLoop, Predictor
 from gaident.estimation.prefilter import Prefilter
 from gaident.estimation.projection import WORST
 from gaident.estimation.regression.inverse_dynamics import inverse_dynamics
-from gaident.estimation.regression.motion import BAND, ORDER, cutoff_of
+from gaident.estimation.regression.motion import ORDER, cutoff_of
 from gaident.estimation.regression.torque_terms import TERMS
 from gaident.estimation.term import Scales, Term
 from gaident.models.model import Model
@@ -246,7 +246,7 @@ def _axis(data: DataSet) -> InverseDynamics | None:
     """
     if not data.torque_logged:
         return None
-    records, highest = list(data.records), BAND / data.records[0].dt
+    records, highest = list(data.records), POLICY.highest_band / data.records[0].dt
     cutoffs = [min(cutoff_of(r, ORDER) for r in records)]
     while 2.0 * cutoffs[-1] <= highest:  # no decision: steps of a search
         cutoffs.append(2.0 * cutoffs[-1])

@@ -25,7 +25,7 @@ from gaident.policy.table import POLICY
 
 __all__ = ["Dependence", "beside_torque_noise", "dependence", "families", "without_torque"]
 
-ROOM, LEAST = 16, 4  # no decision: samples for each function of a driver's family, and the functions that any record has room for
+KNOTS = np.array([1.0, 4.0, 12.0, 30.0, 60.0])  # no decision: multiples of the first knot, whose place is a row of the policy
 
 Vector = NDArray[np.float64]
 Matrix = NDArray[np.float64]
@@ -94,16 +94,17 @@ def families(objective: Objective, fit: Fit) -> dict[str, Matrix]:
 def _columns(objective: Objective, fit: Fit, error: Vector) -> dict[str, Matrix]:
     data, parameters, x = objective.data, fit.parameters, fit.x
     w = objective.measured - error
-    room = max(len(w) // ROOM, LEAST)  # numbers for a family; from 290 samples on there is room for all
+    # Numbers for a family; from 290 samples on there is room for all.
+    room = max(len(w) // POLICY.function_samples, POLICY.least_functions)
     torques: dict[str, Matrix] = {
         "velocity": _hats_by_sign(w),
         "position": _of_position(data.angle, w),
-        "torque": _hats(data.torque, 8),
+        "torque": _hats(data.torque, POLICY.function_knots),
         "past": _of_path(data.angle, data.lengths),
         "time": _drifts(data.time, w),
     }
     if data.command is not None:
-        torques["command"] = _hats(data.command, 8)
+        torques["command"] = _hats(data.command, POLICY.function_knots)
     response = fit.predictor.torque_response
     columns = {d: response(parameters, x, rows) for d, rows in torques.items()}
     if parameters.masses == 2:
@@ -180,7 +181,8 @@ def _hats(s: Vector, count: int) -> Matrix:
 def _hats_by_sign(w: Vector) -> Matrix:
     """Functions of velocity that may jump at 0: hats in |w| on either side."""
     top = float(np.abs(w).max()) or 1.0
-    knots = top * np.array([0.0, 0.01, 0.04, 0.12, 0.3, 0.6, 1.0])
+    shares = np.minimum(np.asarray(POLICY.slow_knot * KNOTS), 1.0)
+    knots = top * np.unique([0.0, *shares, 1.0])
     hats = np.array([np.interp(np.abs(w), knots, np.eye(len(knots))[i]) for i in range(len(knots))])
     rows = np.vstack([hats * (w > 0.0), hats * (w < 0.0)])
     rows = rows[np.abs(rows).sum(axis=1) > 0.0]
@@ -192,7 +194,7 @@ def _of_position(angle: Vector, w: Vector) -> Matrix:
     turned = float(np.ptp(angle))
     direction = np.sign(w)
     shapes = [f(k * angle) for k in (1.0, 2.0) for f in (np.sin, np.cos) if k * turned > 1.0]
-    shapes += list(_hats(angle, 6)[1:])
+    shapes += list(_hats(angle, POLICY.angle_knots)[1:])
     rows = [s * d for s in shapes for d in (np.ones_like(w), direction)]
     return np.array(rows)
 
@@ -200,7 +202,7 @@ def _of_position(angle: Vector, w: Vector) -> Matrix:
 def _of_path(angle: Vector, lengths: tuple[int, ...]) -> Matrix:
     """Elasto-plastic elements: each follows the angle until it yields at a width of its own, and so depends on the past."""
     travel = float(np.ptp(angle)) or 1.0
-    widths = travel * np.geomspace(3e-4, 0.3, 6)
+    widths = travel * np.geomspace(POLICY.least_width, POLICY.most_width, POLICY.path_widths)
     rows = np.empty((len(widths), len(angle)))
     at = 0
     for n in lengths:

@@ -43,7 +43,6 @@ __all__ = [
 Vector = NDArray[np.float64]
 SHAFT_RATIOS, SHAFT_DAMPING = (0.6, 0.75, 0.87), 0.05  # no decision: a start; zeros below the poles, as on a shaft
 SLOWEST_SHAFT, SHAFT_SPAN, HIGHEST_SHAFT = 8.0, 0.02, 0.9  # no decision: its ends, in half periods, of the highest, of Nyquist's
-AT_BOUND = 0.999  # no decision: of a bound, what a fit that ends there has
 Matrix = NDArray[np.float64]
 
 
@@ -266,7 +265,7 @@ def is_mechanism(parameters: Parameterisation, x: Vector) -> bool:
     for t in parameters.terms:
         if t.resonates:
             _, zp, _, zz = parameters.effect_values(x[None, :], t.name)[0]
-            if max(zp, zz) > AT_BOUND * POLICY.swing_damping:
+            if max(zp, zz) > POLICY.at_bound * POLICY.swing_damping:
                 return False
     if parameters.masses == 1:
         return not parameters.on_a_spring or bool(parameters.base_values(x[None, :])[0, 2] > 0.0)

@@ -43,7 +43,6 @@ Vector = NDArray[np.float64]
 Matrix = NDArray[np.float64]
 
 DAMPING = 0.05  # no decision: a start
-ROOM = 8  # no decision: samples for each direction that is taken out before a noise filter is fitted
 FURTHEST = 2.0  # no decision: times the way to a start, where the next one stands
 
 
@@ -247,7 +246,7 @@ class ScoreTest:
                 if finite.any():
                     nearest = np.argmin(_along(project_out(base.J, t.errors[finite]) - rest, rest))
                     directions.append((t.errors[finite][nearest] - base.error)[None, :])
-        D = np.vstack(directions)[: max(len(base.error) // ROOM, 1)]
+        D = np.vstack(directions)[: max(len(base.error) // POLICY.direction_samples, 1)]
         return self.objective.noise_of(project_out(D, base.error[None, :])[0], base.hypothesis.predictor.closed)
 
     def ranked(self, noise: NoiseFilter | None) -> list[Screened]:

@@ -46,10 +46,6 @@ __all__ = ["UnloggedForm", "in_series", "leaves_noise", "unlogged_form"]
 Vector = NDArray[np.float64]
 Matrix = NDArray[np.float64]
 
-NYQUIST = 0.95  # no decision: of the Nyquist frequency, the highest notch
-SLOWEST = 0.1  # no decision: of the record's duration, the longest time constant and the longest period of a notch
-DAMPING = (0.05, 2.0)  # no decision: denominators of notches that drives have
-
 
 @dataclass(frozen=True, eq=False)
 class _Number:
@@ -109,7 +105,7 @@ class _Variant:
 
 
 def _band(dt: float, duration: float) -> tuple[float, float]:
-    return 1.0 / (SLOWEST * duration), NYQUIST * 0.5 / dt
+    return 1.0 / (POLICY.form_slowest * duration), POLICY.notch_highest * 0.5 / dt
 
 
 REACH = (1.0 + POLICY.gain_doubt) / (1.0 - POLICY.gain_doubt)
@@ -120,14 +116,19 @@ WEIGHT = _Number("weight", "1", lambda dt, duration: (0.0, 2.0), lambda dt, dura
 TIME_CONSTANT = _Number(
     "time_constant",
     "s",
-    lambda dt, duration: (0.1 * dt, SLOWEST * duration),
-    lambda dt, duration: np.geomspace(0.5 * dt, 0.1 * SLOWEST * duration, POLICY.form_starts),
+    lambda dt, duration: (0.1 * dt, POLICY.form_slowest * duration),
+    lambda dt, duration: np.geomspace(0.5 * dt, 0.1 * POLICY.form_slowest * duration, POLICY.form_starts),
 )
 FREQUENCY = _Number(
     "frequency", "Hz", _band, lambda dt, duration: np.geomspace(*_band(dt, duration), 2 * POLICY.form_starts + 1)[1:-1]
 )
 OF_ZEROS = _Number("numerator_damping", "1", lambda dt, duration: (0.0, 1.0), lambda dt, duration: (0.1,), logarithm=False)
-OF_POLES = _Number("denominator_damping", "1", lambda dt, duration: DAMPING, lambda dt, duration: (0.7,))
+OF_POLES = _Number(
+    "denominator_damping",
+    "1",
+    lambda dt, duration: (POLICY.notch_least_damping, POLICY.notch_most_damping),
+    lambda dt, duration: (0.7,),
+)
 
 VARIANTS: tuple[_Variant, ...] = (
     _Variant(OTHER_GAINS, Text("other gains"), (RATIO,), lambda pi, ratio: Cascade(replace(pi, ki=pi.ki * ratio))),

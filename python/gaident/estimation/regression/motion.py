@@ -23,24 +23,12 @@ from gaident.data.record import Record
 from gaident.models.starts import noise_std
 from gaident.policy.table import POLICY
 
-__all__ = ["BAND", "ORDER", "Motion", "cutoff_of", "low_passed", "motion_of", "noise_share", "torque_noise"]
+__all__ = ["ORDER", "Motion", "cutoff_of", "low_passed", "motion_of", "noise_share", "torque_noise"]
 
 Vector = NDArray[np.float64]
 Spectrum = tuple[Vector, Vector, float]  # frequencies [Hz], power density, level of the noise
 
-ORDER = 4  # no decision: of the Butterworth filter of all regressions
-NOISE_SHARE = 1e-3  # no decision: how exact an inertia is
-"""Most of the acceleration's power that may be noise: so much is the inertia too small by it."""
-
-BAND = 0.1  # no decision: how exact a derivative is
-"""The cutoff is at most this share of the sample rate: the derivative is then exact to within 2 % in the pass band
-up to a third of the cutoff, and 100 Hz at 1 kHz is the practice of the literature."""
-
-LOWEST = 0.005  # no decision: where a filter may begin
-"""The cutoff is at least this share of the sample rate, whatever the noise."""
-
-HIGH = (0.35, 0.475)  # no decision: where noise is read
-"""Where the noise level is read, as shares of the sample rate: the signal is assumed to be elsewhere."""
+ORDER = 4  # no decision: the order of the Butterworth filter of all regressions; the cutoff decides what is left
 
 
 @dataclass(frozen=True, eq=False)
@@ -107,9 +95,9 @@ def cutoff_of(rec: Record, order: int) -> float:
     spectrum has between 0.35 and 0.475 of the sample rate; what is signal there makes the cutoff lower, never higher.
     At most a tenth and at least a two-hundredth of the sample rate.
     """
-    grid = BAND / rec.dt * np.geomspace(1.0, LOWEST / BAND, 60)
+    grid = POLICY.highest_band / rec.dt * np.geomspace(1.0, POLICY.lowest_band / POLICY.highest_band, 60)
     spectrum = _spectrum(rec)
-    fit = (float(fc) for fc in grid if noise_share(rec, float(fc), order, spectrum) <= NOISE_SHARE)
+    fit = (float(fc) for fc in grid if noise_share(rec, float(fc), order, spectrum) <= POLICY.acceleration_noise)
     return _round(next(fit, float(grid[-1])))
 
 
@@ -156,7 +144,7 @@ def _spectrum(rec: Record) -> Spectrum:
     x = rec.velocity if rec.position is None else rec.position
     line = x[0] + (x[-1] - x[0]) / (x.size - 1) * np.arange(x.size)
     f, power = welch(x - line, 1.0 / rec.dt, nperseg=min(x.size, 2048))  # no decision: the resolution of a spectrum
-    high = (f >= HIGH[0] / rec.dt) & (f <= HIGH[1] / rec.dt)
+    high = (f >= POLICY.noise_from / rec.dt) & (f <= POLICY.noise_to / rec.dt)
     return f, power, float(np.median(power[high])) if np.any(high) else 0.0
 
 
