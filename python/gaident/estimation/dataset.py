@@ -37,7 +37,7 @@ __all__ = ["DataSet", "with_angle"]
 Vector = NDArray[np.float64]
 Matrix = NDArray[np.float64]
 
-MOST_SUBSTEPS = 5  # no decision: powers of two
+MOST_SUBSTEPS = 5  # no decision: powers of two, 32 substeps of a sample at most: how exact a simulation is
 FINEST = 0.125e-3  # no decision: s, of a substep: the accuracy that friction on a stiff shaft needs
 
 

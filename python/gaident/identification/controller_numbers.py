@@ -46,7 +46,7 @@ BOUNDED = ("kp", "ki", "command_weight")  # no controller has one below 0
 GAINS = (*BOUNDED, "acceleration_feedforward", "friction_feedforward")
 """Linear in the torque; the others are searched by their logarithm, but a numerator's damping and a share."""
 LOGARITHMIC = ("gain", "time_constant", "frequency", "denominator_damping")
-SLOPE_STEP = 1e-5  # no decision: of a number, for a slope
+SLOPE_STEP = 1e-5  # no decision: the step of a difference, of a number
 DEVIATION_ROUNDING = 1e-12  # no decision: of the torque's deviation, what a sum is exact to
 
 

@@ -22,7 +22,7 @@ Vector = NDArray[np.float64]
 Matrix = NDArray[np.float64]
 
 # Zeros with a damping ratio below half of this do not determine K_G by the product equation.
-WEAK_DAMPING = 1e-3  # no decision: the weight of one equation beside another
+WEAK_DAMPING = 1e-3  # no decision: the weight of one equation beside another where no damping gives it one
 
 
 def coefficients_of_mechanics(mechanics: Vector) -> Vector:

@@ -24,6 +24,11 @@ MARK = "# no decision: "
 # and no factor of a standard deviation; nor does a local name stand there for them.
 # Free are these, what only guards a division or stands for no limit, and 2 pi; a 2 is a count, a 2.0 is a factor.
 FREE = (-1, 0, 1, 2)
+# A named number that is compared or bounds looks like one that decides: a few words that only say what it is are no reason.
+REASON = re.compile(
+    r"rounding|memory|what an argument may be|of a solver|the step of a difference|a start|a grid|a unit|exact to|by 0|how many"
+)
+SENTENCE = 10  # words
 BOUNDS = {"max", "min", "maximum", "minimum", "clip"}
 STEPS = {"max_nfev", "maxiter", "popsize"}
 FITS = {"fit", "fitted", "refitted", "continued", "reestimated", "evolved", "start"}
@@ -36,7 +41,6 @@ TABLES = {
     "diagnosis/library/kinds": "the same",
     "diagnosis/experiments/menu": "shapes of the commands that are proposed",
     "diagnosis/experiments/commands": "the same",
-    "diagnosis/experiments/first_experiment": "the same",
 }
 # Whole modules in which no number decides.
 DRAWN = {
@@ -88,6 +92,24 @@ def numbers_named(text: str) -> list[str]:
             reasons = [line.partition(MARK)[2] for line in lines[inner.lineno - 1 : inner.end_lineno]]
             if numeric(value) and not any(r.strip() for r in reasons):
                 found += [n for n in names if re.fullmatch(r"_?[A-Z][A-Z0-9_]*", n)]
+    return found
+
+
+def numbers_compared(text: str) -> list[str]:
+    """Names in capitals of a module's numbers that are compared or bound, where their line does not say why they decide nothing.
+
+    A reason is one of those that policy/table.py lists, or a sentence.
+    """
+    found, lines, tree = [], text.splitlines(), ast.parse(text)
+    parts = [part for node in ast.walk(tree) for part in ([node] if isinstance(node, ast.Compare) else bounded(node))]
+    used = {n.id for part in parts for n in ast.walk(part) if isinstance(n, ast.Name)}
+    for node in tree.body:
+        if isinstance(node, (ast.Assign, ast.AnnAssign)) and node.value is not None and numeric(node.value):
+            reason = lines[node.lineno - 1].partition(MARK)[2]
+            targets = node.targets if isinstance(node, ast.Assign) else [node.target]
+            names = {n.id for t in targets for n in ast.walk(t) if isinstance(n, ast.Name) and n.id.isupper()}
+            if not REASON.search(reason) and len(reason.split()) < SENTENCE:
+                found += sorted(names & used)
     return found
 
 
@@ -277,6 +299,19 @@ def test_a_number_with_a_name_is_in_the_policy_or_says_why_not() -> None:
     texts = modules()
     found = [f"{module}.{name}" for module, text in texts.items() if module not in DRAWN for name in numbers_named(text)]
     assert not found, f"a number that decides is a row of policy/table.py, others say '{MARK}why': {', '.join(found)}"
+
+
+def test_a_named_number_that_is_compared_says_why_it_decides_nothing() -> None:
+    texts = modules()
+    found = [f"{module}.{name}" for module, text in texts.items() if module not in DRAWN for name in numbers_compared(text)]
+    assert not found, f"a number that is compared is a row of the policy, or '{MARK}' and a whole sentence: {', '.join(found)}"
+
+
+def test_what_counts_as_a_reason() -> None:
+    text = "A = 0.9  # no decision: of the torque\nB = 1e-9  # no decision: rounding\nC = 3  # no decision: of a message\n"
+    sentence = "each pass shows outliers that others hid, and ends where none is new"
+    text += f"D = 4  # no decision: {sentence}\nE, F = 16, 4  # no decision: samples\n"
+    assert numbers_compared(f"{text}x < A * y\nx < B\nprint(C)\nx > D\nmax(n // E, F)\n") == ["A", "E", "F"]
 
 
 def test_no_number_without_a_name_decides() -> None:

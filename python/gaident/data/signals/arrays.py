@@ -14,7 +14,7 @@ from gaident.errors import RecordError
 
 __all__ = ["MINIMUM_SAMPLES", "channel", "first_not_finite", "positive_number"]
 
-MINIMUM_SAMPLES = 20  # no decision: what a record may be
+MINIMUM_SAMPLES = 20  # no decision: what an argument may be: a record has so many samples at least
 """Fewer samples identify nothing."""
 
 _REFUSED_KINDS = {

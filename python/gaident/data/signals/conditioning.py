@@ -14,7 +14,7 @@ from gaident.errors import RecordError
 __all__ = ["differentiate", "low_pass"]
 
 _ORDER = 4  # no decision: of a low-pass
-_SHORTEST_EXTENSION = 15  # no decision: of a low-pass
+_SHORTEST_EXTENSION = 15  # no decision: within so many samples beyond the ends a filter settles, and more of them change nothing
 
 
 def differentiate(position: ArrayLike, dt: float, cutoff_hz: float | None = None) -> NDArray[np.float64]:

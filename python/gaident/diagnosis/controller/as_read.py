@@ -24,7 +24,7 @@ __all__ = ["as_read", "outliers_of_the_log"]
 Lines = NDArray[np.intp]
 Vector = NDArray[np.float64]
 
-SPEED_STEP = 1e-6  # no decision: of the highest speed, of a difference
+SPEED_STEP = 1e-6  # no decision: the step of a difference, of the highest speed
 
 
 def as_read(recorded: Sequence[Record], cleaned: Sequence[Record], controller: Controller | None) -> tuple[Record, ...]:

@@ -63,7 +63,7 @@ __all__ = ["Form", "Shown", "form_shown"]
 Vector = NDArray[np.float64]
 Matrix = NDArray[np.float64]
 
-INSIDE = 1e-9  # no decision: of a bound, where a search starts
+INSIDE = 1e-9  # no decision: a start: so far inside of its bound a search begins
 SUM_ROUNDING = 1e-9  # no decision: of the largest torque, what a sum is exact to
 
 

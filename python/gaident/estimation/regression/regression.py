@@ -25,7 +25,7 @@ __all__ = ["covariance", "solve"]
 Vector = NDArray[np.float64]
 Matrix = NDArray[np.float64]
 
-LAGS_PER_ROOT = 1.3  # no decision: of an estimate of variance, see above
+LAGS_PER_ROOT = 1.3  # no decision: bandwidth of an estimate of variance: its theory asks for a multiple of the root, see above
 SOLVER_RANK = 1e-10  # no decision: of a solver
 """Singular values below this share of the largest, of columns of equal length, are zero."""
 

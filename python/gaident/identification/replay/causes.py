@@ -27,7 +27,7 @@ Allows: TypeAlias = Callable[[Vector, tuple[float, float], int], bool]
 
 # By how much of ki dt the newest error counts more than half, and the one before less: the rule of integration in words.
 RULES = {0.0: "", 0.5: "a rectangular integral", -0.5: "a rectangular integral that lacks the newest error"}
-RPM = 30.0 / np.pi  # no decision: rpm in 1 rad/s
+RPM = 30.0 / np.pi  # no decision: a unit: rpm in 1 rad/s
 
 
 @dataclass(frozen=True, eq=False)
