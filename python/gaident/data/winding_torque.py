@@ -22,8 +22,8 @@ Vector = NDArray[np.float64]
 ELECTRICAL = frozenset({"voltage", "current"})
 """Columns that are no channel of a record, but make its torque."""
 LAGS = (
-    "The inductance L of the winding is not given, and its torque is made as if the current followed the voltage at once: the lag "
-    "L/R that it has in the motor then looks like a filter of the velocity, or like a lag of the torque. Give the inductance [H]."
+    "The inductance L of the winding is not given, so its torque is made as if the current followed the voltage at once. The lag "
+    "L/R that it has in the motor looks like a filter of the velocity, or like a lag of the torque. Give the inductance [H]."
 )
 
 

@@ -276,7 +276,7 @@ def test_the_smoother_is_fast_and_refuses_what_it_cannot_see() -> None:
 def test_the_staircase_triggers_almost_everything() -> None:
     found = excitation(drive(Tc=0.05, samples=4000), CONTROLLER, TWO_MASS.model())
     assert set(found.not_testable) == set()
-    assert found.reversals >= 8 and found.torque_reversals >= 10 and 4 < found.revolutions < 5
+    assert found.reversals >= 8 and 4 < found.revolutions < 5
     assert len([v for v in found.speeds if v]) >= 6 and found.steps[-1] == 100.0
     assert set(found.one_sided) >= {"torque_saturation", "integrator_clamp", "command_rate_limit"}
     assert found.one_sided["extra_resonance"].startswith(f"one above {0.4 / DT:.3g} Hz would not have shown")

@@ -77,3 +77,39 @@ def test_that_none_is_named_is_said_only_where_none_is(monkeypatch: pytest.Monke
         assert bool(found.causes) == bool(only)
         assert any(said in note for note in found.notes)
         assert any("none is named" in note for note in found.notes) == (not only)
+
+
+def swinging(seed: int) -> ga.Record:
+    """A drive that swings over part of a turn, its torque logged alone, with dry friction that changes with the angle.
+
+    Steps of 0.05 ms with set-valued friction and a PI at 1 kHz, no code of the library: J = 1e-3 kg m^2, D = 3e-3 N m s/rad.
+    """
+    dt, n, sub, J, B = 1e-3, 4000, 20, 1e-3, 3e-3
+    t = dt * np.arange(n)
+    place = np.radians(30.0) * (0.8 * np.sin(2 * np.pi * 0.8 * t) + 0.2 * np.sin(2 * np.pi * 2.3 * t))
+    command, noise = np.gradient(place, dt), 0.03 * np.random.default_rng(seed).standard_normal(n)
+    w = theta = integral = before = 0.0
+    log = np.empty((3, n))
+    for k in range(n):
+        error = command[k] - (w + noise[k])
+        integral += 1.5 * dt * (error + before) / 2
+        before = error
+        u = 0.08 * error + integral
+        log[:, k] = w + noise[k], u, theta
+        for _ in range(sub):
+            free = (w + dt / sub * (u - 0.02 * theta * np.tanh(w / 0.05)) / J) / (1 + dt / sub * B / J)
+            most = dt / sub * 0.02 / J
+            now = 0.0 if abs(free) <= most else free - np.sign(free) * most
+            theta += dt / sub * 0.5 * (w + now)
+            w = now
+    return ga.Record(dt, velocity=log[0], torque=log[1], position=log[2])
+
+
+def test_a_viscous_friction_that_drives_the_axis_is_no_mechanism() -> None:
+    """By whitened errors a drag of the square root of the speed, and -0.014 N m s/rad beside it: worse than without an effect."""
+    dia = ga.diagnose(swinging(0))
+    assert [f.effect for f in dia.causes] == ["asymmetric_friction"] and dia.verdict == "partly explained", dia.summary()
+    mean = np.mean([dia.causes[0].parameters[f"torque_{way}"].value for way in ("positive", "negative")])
+    assert mean == pytest.approx(0.02, rel=0.3)
+    assert abs(dia.mechanics["viscous_friction"].value) < 3e-3 and dia.mechanics["inertia"].value == pytest.approx(1e-3, rel=0.1)
+    assert dia.after.rmse < 0.7 * dia.before.rmse

@@ -45,7 +45,6 @@ class Excitation:
     slow              time moving below a tenth of the highest speed [s]
     standstill        time at rest [s]
     highest_torque    max |u| [N m]; torque_share: of the controller's torque limit (nan without one)
-    torque_reversals  changes of the torque's sign, noise left out
     opposed           share of the moving time in which torque and velocity have opposite signs
     revolutions       travel (farthest minus nearest position) in turns
     steps             distinct sizes of command jumps [rad/s], ascending
@@ -62,7 +61,6 @@ class Excitation:
     standstill: float
     highest_torque: float
     torque_share: float
-    torque_reversals: int
     opposed: float
     revolutions: float
     steps: tuple[float, ...]
@@ -124,7 +122,6 @@ def excitation(
         standstill=sum(m.dt * int(np.sum(~m.moving)) for m in motions),
         highest_torque=torque,
         torque_share=torque / limit if math.isfinite(limit) else math.nan,
-        torque_reversals=sum(_changes(m.torque, m.torque_floor) for m in motions),
         opposed=opposed / moving if moving else 0.0,
         revolutions=max(float(np.ptp(m.position)) for m in motions) / TURN,
         steps=_distinct([s for m in motions for s in m.jumps], POLICY.apart * max(top, TINY)),

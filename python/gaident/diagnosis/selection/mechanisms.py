@@ -27,6 +27,7 @@ __all__ = [
     "as_one_mass",
     "as_two_masses",
     "balanced_on_a_spring",
+    "drives_itself",
     "evenly_damped",
     "is_mechanism",
     "on_a_shaft",
@@ -271,6 +272,11 @@ def is_mechanism(parameters: Parameterisation, x: Vector) -> bool:
         return not parameters.on_a_spring or bool(parameters.base_values(x[None, :])[0, 2] > 0.0)
     _, a, e1, e0, _, f0 = parameters.base_values(x[None, :])[0]
     return bool(e0 + a * e1 > f0)
+
+
+def drives_itself(fit: Fit) -> bool:
+    """Whether the viscous friction of a mechanism is negative, s + a with a < 0: what drives is no friction."""
+    return bool(fit.parameters.base_values(fit.x[None, :])[0, 1] < 0.0)
 
 
 def swings(fit: Fit) -> bool:

@@ -24,7 +24,7 @@ from gaident.diagnosis.selection.bases import ByOutputErrors, Task, heaviest, li
 from gaident.diagnosis.selection.beam import Beam
 from gaident.diagnosis.selection.beam import reduced as reduced_by
 from gaident.diagnosis.selection.decimated import blocks_of, decimated_objective, moved
-from gaident.diagnosis.selection.mechanisms import resonance, swings
+from gaident.diagnosis.selection.mechanisms import drives_itself, resonance, swings
 from gaident.diagnosis.selection.model_space import representative, words
 from gaident.diagnosis.selection.moves import Moves
 from gaident.diagnosis.selection.rivals import Replacement, rivals_of
@@ -160,9 +160,10 @@ def _decided(task: Task, note: Callable[[str], None]) -> _Found:
         test = specification(space, task, final)
         by_output = _offered(by_output, final)
     whitened = _Found(space, base, final, test)
-    if by_output is not None and (
-        test.contradicts or not space.is_noise(final) or by_output.space.hidden(final, by_output.final)
-    ):
+    if by_output is None:
+        return whitened
+    impossible = bool(by_output.final.effects) and drives_itself(final) and not space.small_unwhitened(final)
+    if test.contradicts or impossible or not space.is_noise(final) or by_output.space.hidden(final, by_output.final):
         return replace(by_output, specification=test, whitened=whitened)
     return whitened
 
