@@ -59,6 +59,14 @@ def test_a_simulated_drive_without_limits_keeps_to_them_too(known: dict[str, flo
         assert np.abs(done.torque).max() <= limits.torque, name
 
 
+def test_in_half_a_second_no_command_asks_for_more_torque_than_there_is() -> None:
+    """A move between two holds is as fast as the time wants it, and no steeper than the torque allows."""
+    limits = Limits(100.0, 1.5, 20.0, 0.5)
+    for name, command in everything(limits, {"inertia": 2e-4, "kp": 0.02}):
+        done = ga.run(MASS, ga.Record(DT, command, 0.0 * command), ga.PI(**GAINS))
+        assert np.abs(done.torque).max() <= limits.torque, name
+
+
 def test_the_first_experiment_keeps_a_stiff_loop_within_its_limits() -> None:
     """kp = 0.06 N m s/rad at 2.4 N m: full steps would ask for 7 N m; the shaft is soft and the loop overshoots by a quarter."""
     drive = ga.TwoMass(JM=4e-4, DM=1.5e-3, JL=6e-4, DL=5e-4, KG=28.0)

@@ -116,13 +116,17 @@ def _constant_slow(b: Bench) -> Vector:
 
 
 def _holds(b: Bench) -> Vector:
-    """Eight angles within a turn or the travel, approached from both sides, a hold at each."""
+    """Eight angles within a turn or the travel, approached from both sides, a hold at each.
+
+    A move is half a wave of the sine, v sin(pi t/T), whose steepest slope v pi/T is that of the bench at most.
+    """
     angle = min(b.travel, math.tau) / 8.0
     period = b.seconds / 16.0
     move, hold = 0.5 * period, rest(0.5 * period, b.dt)
     count = max(2, round(move / b.dt))
     shape = np.sin(np.pi * (np.arange(count) + 0.5) / count)
-    move_once = min(b.speed, angle / (b.dt * float(shape.sum()))) * shape
+    highest = min(b.speed, angle / (b.dt * float(shape.sum())), b.slope * move / np.pi)
+    move_once = highest * shape
     once = np.concatenate([move_once, hold])
     return np.concatenate([np.tile(once, 8), np.tile(-once, 8)])
 
