@@ -55,6 +55,9 @@ LIKELY = {
 """The likely reason of each contradiction, in words."""
 
 
+DIVERGED = 1e3  # no decision: of the torque's rms; a model that needs so much more has diverged, as a free run has
+
+
 @dataclass(frozen=True)
 class Check:
     """The second method's answer: what it found, its force error [N m], the comparison, before and after with their force errors.
@@ -124,7 +127,7 @@ def _forces(
             error = filtered.force_error(model, torques)
         except GaidentError:
             return None
-        return (error, [e for e, _ in torques]) if math.isfinite(error.rms) else None
+        return (error, [e for e, _ in torques]) if error.rms <= DIVERGED * error.torque_rms else None
 
     def fitness(plain: Fitness, found: tuple[ForceError, list[Vector]] | None) -> Fitness:
         if found is None:

@@ -2,27 +2,30 @@
 
 With validation records these are used whole.
 Without, parameters are fitted again to the first 70 % of each record and scored on the rest of one continuous run,
-which is not restarted; where a record is too short for that, the figures are in-sample and say so.
+which is not restarted; the linear model is then identified on the same 70 %.
+Where a record is too short for that, or one of its parts holds no motion, the figures are in-sample and say so.
 """
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from gaident.axis import Text
 from gaident.control.controller import Controller
 from gaident.control.pi import bare_pi
 from gaident.data.record import Record
+from gaident.data.torque_kind import MEASURED
+from gaident.diagnosis.held_parts import IN_SAMPLE, held_parts
 from gaident.diagnosis.library.terms import LIBRARY
 from gaident.diagnosis.records.hygiene import quantisation
 from gaident.estimation.criterion import effective_samples
 from gaident.estimation.dataset import DataSet
 from gaident.estimation.least_squares import fit
 from gaident.estimation.objective import Fit, Objective
-from gaident.estimation.prediction import torque_noise_in
 from gaident.models import simulate
 from gaident.models.model import Model
 from gaident.models.simulate import initial_state
@@ -32,11 +35,9 @@ from gaident.policy.table import POLICY
 from gaident.results.fitness import Fitness
 
 __all__ = [
-    "IN_SAMPLE",
     "Gains",
     "closed_over",
     "free_run_errors",
-    "held_out_from",
     "interval_of_fall",
     "measured_gains",
     "with_effects",
@@ -44,7 +45,7 @@ __all__ = [
 
 Vector = NDArray[np.float64]
 
-IN_SAMPLE = "in-sample"
+NOISES = 8  # no decision: draws of a torque's noise, how closely the floor of a free run is known
 
 
 @dataclass(frozen=True)
@@ -53,7 +54,7 @@ class Gains:
 
     harmful: effects without which the extended model is better on the held-out data, beyond chance. scored: records, each with
     the first sample that is held out; mechanism, extended: the models, without and with the effects, fitted to the rest.
-    closed: whether the runs were closed over the controller; the torque drives them else.
+    closed: whether the runs were closed over the controller; the torque drives them else. notes: of records that are left out.
     """
 
     before: Fitness
@@ -66,6 +67,7 @@ class Gains:
     extended: Model
     harmful: tuple[str, ...] = ()
     closed: bool = False
+    notes: tuple[Text, ...] = ()
 
     def of(self, effect: str) -> float:
         """Fall of the error that one effect brought, as a fraction of the error before it."""
@@ -73,41 +75,44 @@ class Gains:
 
     @property
     def floor(self) -> float:
-        """Rms error [rad/s] that noise leaves of a free run: of the velocity, and of a measured torque that drives the model."""
-        driving = [] if self.closed else [r for r, _ in self.scored]
-        return float(np.hypot(self.after.noise_floor, torque_noise_in(self.mechanism, driving)))
+        """Rms error [rad/s] that noise leaves of a free run: of the velocity, and of a measured torque that drives the model.
+
+        The torque's noise passes the extended model, which is the one that is judged:
+        a mechanism that was fitted without the effects may be far from the axis.
+        What exceeds the motion itself is no bound of an error and left out.
+        """
+        if self.closed or not self.scored:
+            return self.after.noise_floor
+        moved = _moved_by_torque_noise(self.extended, self.scored)
+        motion = np.concatenate([r.velocity[first:] for r, first in self.scored])
+        shown = moved < float(np.sqrt(np.mean(motion**2)))
+        return float(np.hypot(self.after.noise_floor, moved if shown else 0.0))
 
 
 def measured_gains(
     records: Sequence[Record],
     validation: Sequence[Record],
     controller: Controller | None,
-    linear: Model,
+    linear: Callable[[tuple[int, ...] | None], Model],
     final: Fit,
     objective: Objective,
     noise: float | None,
     at_controller: dict[str, dict[str, float]],
 ) -> Gains:
-    """Errors of the linear model, of each stage and of the extended model, closed over the controller where they can be."""
+    """Errors of the linear model, of each stage and of the extended model, closed over the controller where they can be.
+
+    linear: the linear model of the first samples of each record, so many of each; None: of all.
+    """
     loop = closed_over(controller, (*records, *validation), final.effects)
     controller = objective.data.older(loop)
-    part: tuple[int, ...] | None
-    if validation:
-        scored, words, part = [(r, 0) for r in validation], "validation records", None
-    elif all(len(r) >= POLICY.least_held_out for r in records):
-        scored = [(r, held_out_from(r)) for r in records]
-        part = tuple(first for _, first in scored)
-        by_time = all(first == int(POLICY.fitted_share * len(r)) for r, first in scored)
-        words = f"the last 30 % of {'the record' if by_time else 'its path'}, parameters fitted to the first 70 %"
-    else:
-        scored, words, part = [(r, 0) for r in records], IN_SAMPLE, None
+    scored, words, part, notes = held_parts(records, validation, noise)
     angles = [r.position is not None for r, _ in scored]
     scored = [(_turned(r, loop, final), first) for r, first in scored]
     stages = _stages(final, objective, part)
     named = list(at_controller.items())
     bare = stages[0].parameters.model(stages[0].x)
     # Not known to the identification: the velocity's age, and what the torque did between the lines of a slower log.
-    chain = [bare if objective.data.slower or objective.data.age else linear]
+    chain = [bare if objective.data.slower or objective.data.age else linear(part)]
     chain += [with_effects(bare, dict(named[:k])) for k in range(1, len(named) + 1)]
     chain += [with_effects(f.parameters.model(f.x), at_controller) for f in stages[1:]]
     # Where the simulated loop is known not to be the drive's, the torque drives the models that are compared and printed.
@@ -159,6 +164,7 @@ def measured_gains(
         extended=chain[-1],
         closed=closing is not None,
         harmful=tuple(harmful),
+        notes=notes,
     )
 
 
@@ -190,16 +196,6 @@ def _turned(rec: Record, controller: Controller | None, final: Fit) -> Record:
 
 def _without(found: Fit, effect: str, objective: Objective) -> Fit:
     return fit(objective, found.hypothesis.without(effect), found.parameters.removed(found.x, effect), found.noise, POLICY.usual)
-
-
-def held_out_from(rec: Record) -> int:
-    """The first sample that is held out: of the last 30 % of the time or, where these hardly move, of the path."""
-    at = int(POLICY.fitted_share * len(rec))
-    before, after = (float(np.sqrt(np.mean(w**2))) for w in (rec.velocity[:at], rec.velocity[at:]))
-    if after < POLICY.held_out_motion * before:
-        path = np.cumsum(np.abs(rec.velocity))
-        at = int(np.clip(np.searchsorted(path, POLICY.fitted_share * path[-1]), POLICY.least_fitted * len(rec), at))
-    return at
 
 
 def _part(objective: Objective, part: tuple[int, ...] | None) -> Objective:
@@ -247,6 +243,27 @@ def free_run_errors(
             e = (r.velocity - simulate(model, r, controller, state))[first:]
         errors.append(np.where(np.isfinite(e), e, 1e150))
     return errors
+
+
+def _moved_by_torque_noise(model: Model, scored: Sequence[tuple[Record, int]]) -> float:
+    """Rms [rad/s] by which noise of measured torques moves free runs from a sample on; 0 where none was measured.
+
+    The noise of a torque u is white of the standard deviation s of its third differences:
+
+        mean over draws v of (w(u + s v) - w(u))^2,   w(u) the model's free run, with its friction and its gravity.
+    """
+    rng, power, count = np.random.default_rng(0), 0.0, 0
+    for rec, first in scored:
+        count += len(rec) - first
+        if rec.torque is None or rec.torque_is != MEASURED:
+            continue
+        std, state = noise_std(rec.torque), start_state(model, rec, None)
+        with np.errstate(over="ignore", invalid="ignore"):
+            quiet = simulate(model, rec, None, state)
+            for _ in range(NOISES):
+                noisy = rec.with_channels(torque=rec.torque + std * rng.standard_normal(len(rec)))
+                power += float(np.sum((simulate(model, noisy, None, state) - quiet)[first:] ** 2)) / NOISES
+    return float(np.sqrt(power / max(count, 1))) if np.isfinite(power) else float("inf")
 
 
 def start_state(model: Model, rec: Record, controller: Controller | None, read: Controller | None = None) -> Vector | None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -18,8 +18,9 @@ from gaident.diagnosis.controller.driving import Driving
 from gaident.diagnosis.controller.joint_numbers import joint_numbers
 from gaident.diagnosis.experiments.candidates import candidates, loop_notes
 from gaident.diagnosis.experiments.excitation import excitation
-from gaident.diagnosis.explain.alternatives import alternatives_of, impossible_here
+from gaident.diagnosis.explain.alternatives import alike_here, alternatives_of, impossible_here
 from gaident.diagnosis.explain.bending import bent_by, relevance_of
+from gaident.diagnosis.explain.determined import determined, not_determined
 from gaident.diagnosis.explain.held_out import standing
 from gaident.diagnosis.explain.verdict import verdict_of
 from gaident.diagnosis.explain.wording import (
@@ -40,13 +41,14 @@ from gaident.diagnosis.gains import Gains, measured_gains, with_effects
 from gaident.diagnosis.judged import Judged
 from gaident.diagnosis.library.record import findings_of_the_record
 from gaident.diagnosis.library.sides import called_of, name_of, sides_of
-from gaident.diagnosis.library.terms import LIBRARY, conditional_classes, in_controller
+from gaident.diagnosis.library.terms import LIBRARY, in_controller
+from gaident.diagnosis.linear_part import linear_of_part
 from gaident.diagnosis.mechanics import base_shift, mechanics_of, negative_damping
 from gaident.diagnosis.note import Note
 from gaident.diagnosis.records.folded import ADVICE, folded
 from gaident.diagnosis.records.hygiene import cleaned, left_out, quantisation, unexplained
 from gaident.diagnosis.records.sizes import scales_of
-from gaident.diagnosis.selection.attribution import only_describes, shown_by_the_records, simplified, what_is_left
+from gaident.diagnosis.selection import attribution
 from gaident.diagnosis.selection.offset import Offset, offset_of
 from gaident.diagnosis.selection.other_gains import OTHER_GAINS, OtherGains, gain_doubt, under_given
 from gaident.diagnosis.selection.rivals import Replacement
@@ -59,9 +61,9 @@ from gaident.estimation.objective import Fit, Objective
 from gaident.estimation.term import Term
 from gaident.estimation.uncertainty import estimates_of
 from gaident.identification.notes import open_loop_notes
+from gaident.models.model import Model
 from gaident.policy.table import POLICY
 from gaident.results.diagnosis import Diagnosis
-from gaident.results.estimate import Estimate
 from gaident.results.finding import Finding
 from gaident.results.identification import Identification
 from gaident.version import version
@@ -136,9 +138,9 @@ class Work:
         self.notes += older
         self.note(0.85, "looking for what is left")
         self.take(found)
-        simpler = simplified(found.space, found.final, self.left)
+        simpler = attribution.simplified(found.space, found.final, self.left)
         if simpler is not found.final:
-            self.take(compared(found, simpler, self._equivalent_here, self._say))
+            self._take_shorter(simpler)
         self._doubt_controller()
 
     def accept(self, found: Selection) -> None:
@@ -217,7 +219,7 @@ class Work:
 
     def _set_final(self, final: Fit) -> None:
         self.final = final
-        self.adequate, self.left = what_is_left(self.found.space, final)
+        self.adequate, self.left = attribution.what_is_left(self.found.space, final)
         self.under, self.estimate = self.found.estimated()
 
     def judged(self) -> Judged:
@@ -237,7 +239,10 @@ class Work:
                 self.notes.append(hidden_by_torque_noise(floor))
             causes = [e for e in self.final.effects if not self._only_describes(e, driver)]
             estimates = estimates_of(self.under, self.estimate)
-            causes = [e for e in causes if self._determined(e, estimates[e])]
+            if unknown := [e for e in causes if not determined(estimates[e])]:
+                self.notes = [*said, *map(not_determined, unknown)]
+                self._take_shorter(attribution.of_known_size(self.found.space, self.final, unknown))
+                continue
             mechanics = mechanics_of(self.under, self.estimate)
             model = with_effects(self.estimate.parameters.model(self.estimate.x), self.at_controller.effects)
             check = by_second_method(self.data, gains, model, mechanics, estimates)
@@ -247,6 +252,7 @@ class Work:
                 self.notes += why
             instead = None if causes else by_whitened_errors(self.found, self._equivalent_here, self._say)
             if instead is None:
+                self.notes += gains.notes
                 return Judged(gains, driver, causes, estimates, offset_of(self.found.space, self.final), mechanics, model, check)
             self.notes = said
             self.take(instead)
@@ -277,8 +283,8 @@ class Work:
             said_by = evidence_of(effect, gain, alternatives, offset, sides if two else ())
             what = name_of(effect), estimates[effect], alternatives, gains.of(effect), gain, None, said_by, False
             findings.append(Finding(*what, LIBRARY[effect].place, sides))
-        if driver is None and (damping := negative_damping(mechanics)) is not None:
-            driver = "velocity"
+        if (damping := negative_damping(mechanics)) is not None:
+            driver = driver or "velocity"
             self.notes.append(drives_itself(damping))
         real = [f for f in findings if not f.is_noise]
         answered = {*self.not_testable, *(name for f in findings for name in (f.effect, *f.alternatives))}
@@ -346,7 +352,7 @@ class Work:
                 self.clean,
                 self.validation,
                 self.controller,
-                self.idn.model,
+                self._linear_of_part,
                 self.estimate,
                 self.under,
                 self.noise,
@@ -357,14 +363,20 @@ class Work:
             effect = gains.harmful[-1]
             text = "{} would come closer to these records, but makes the held-out data worse: it is not accepted."
             self.notes.append(say(text, called_of(effect).begun()))
-            shorter = self.found.space.without(self.final, effect)
-            self.take(compared(self.found, shorter, self._equivalent_here, self._say))
+            self._take_shorter(self.found.space.without(self.final, effect))
+
+    def _take_shorter(self, final: Fit) -> None:
+        self.take(compared(self.found, final, self._equivalent_here, self._say))
+
+    def _linear_of_part(self, part: tuple[int, ...] | None) -> Model:
+        """The linear model of so many first samples of each record; identified once, whatever effects are judged beside it."""
+        return self.objective.once(("linear model", part), lambda: linear_of_part(self.idn, self.records, self.pi, part))
 
     def _alternatives(
         self, effect: str, rivals: Sequence[Replacement], offset: Offset | None, never: Collection[str]
     ) -> tuple[str, ...]:
         """Rivals, equivalent effects and, where the loop is not that of the drive, the controller; without untestable ones."""
-        shown = shown_by_the_records(self.found.space, self.final, effect)
+        shown = attribution.shown_by_the_records(self.found.space, self.final, effect)
         here = sorted(self._equivalent_here(effect))
         follows = not (self.data.slower and self.driving.in_doubt)
         names = alternatives_of(effect, rivals, here, bool(shown), offset, follows, never)
@@ -380,21 +392,9 @@ class Work:
 
     def _only_describes(self, effect: str, driver: str | None) -> bool:
         of_class = bool(self._equivalent_here(effect))
-        return only_describes(self.found.space, self.final, effect, self.rivals[effect][0], driver, self.left, of_class)
+        return attribution.only_describes(
+            self.found.space, self.final, effect, self.rivals[effect][0], driver, self.left, of_class
+        )
 
     def _equivalent_here(self, effect: str) -> set[str]:
-        """What these records cannot tell from an effect, whatever their noise, for lack of reversals or of sizes of steps."""
-        e = self.excited
-        # Speeds held in either direction, in whichever record, split what a reversal splits.
-        turns = max(e.reversals, int(min(e.speeds, default=0.0) < 0.0 < max(e.speeds, default=0.0)))
-        classes = conditional_classes(turns, len(e.steps), self.data.torque_logged)
-        effect = name_of(effect)
-        return set().union(*(c for c in classes if effect in c)) - {effect} - set(self.not_testable)
-
-    def _determined(self, effect: str, parameters: Mapping[str, Estimate]) -> bool:
-        """Whether the records determine a parameter of an effect. If not, it is not named, and a note says so."""
-        if any(e.identifiable and not e.at_bound for e in parameters.values()):
-            return True
-        text = "{} comes closer to these records, but they do not determine one of its parameters: it is not named."
-        self.notes.append(say(text, called_of(effect).begun()))
-        return False
+        return alike_here(effect, self.excited, self.data.torque_logged) - set(self.not_testable)

@@ -23,7 +23,7 @@ class Fitness:
         Root mean square that the noise of the measured velocity alone leaves [rad/s].
     force_error : float or None
         Root mean square of the logged torque minus the torque that the model needs for the measured motion [N m]; None where no
-        torque is logged, or nothing moves.
+        torque is logged, nothing moves, or the model diverges along that motion.
     torque_rms : float or None
         Root mean square of the torque itself, over the same samples [N m].
     force_floor : float or None

@@ -180,7 +180,7 @@ def _gain(dia: Diagnosis, axis: str, scales: Scales) -> list[str]:
         sizes = (dia.before.rmse, dia.after.rmse, dia.after.noise_floor)
         rows = [(*row, more) for row, more in zip(rows, (f"rmse [{shown}]", *(number(size * x) for x in sizes)), strict=True)]
     in_sample = dia.held_out == "in-sample"
-    where = "IN-SAMPLE: too little data to hold any out" if in_sample else f"on {dia.held_out}"
+    where = "IN-SAMPLE: too little data, or too little motion, to hold any out" if in_sample else f"on {dia.held_out}"
     lines = [f"Free-run simulation, {where}", *table(rows if extended else [rows[0], rows[1], rows[3]])]
     if not dia.loop_follows:
         lines += _wrapped(said(not_the_loop_words(dia), axis), "  ")
@@ -226,13 +226,7 @@ def fall_words(dia: Diagnosis) -> str:
     fall = 100.0 * (1.0 - dia.after.rmse / dia.before.rmse)  # no decision: percent
     low, high = (100.0 * x for x in dia.gain_interval)
     if fall < -1.0:
-        why = Text("the simulated controller is not the drive's")
-        if dia.loop_follows:
-            why = say(
-                "the effects were found on the error of the model driven by the {torque}; closed over this controller (its "
-                "gains, rule and limits) or over other records they do not hold"
-            )
-        return say("The error of the velocity grows by {:.0f} %: this comparison is not valid, {}.", -fall, why)
+        return _growth_words(dia, -fall)
     if fall < 1.0:
         if dia.before.rmse < POLICY.noise_ratio * dia.before.noise_floor:
             hidden = Text(": it is at the noise with and without")
@@ -245,6 +239,26 @@ def fall_words(dia: Diagnosis) -> str:
         return say("The error of the velocity hardly changes ({:+.1f} %){}.", -fall, hidden)
     interval = f" (95 % interval {low:.0f} to {high:.0f} %)" if math.isfinite(low) else ""
     return say("The error falls by {:.0f} %{}.", fall, interval)
+
+
+def _growth_words(dia: Diagnosis, growth: float) -> Text:
+    """Why the error of the velocity grows, by so many percent, and what the names rest on then."""
+    if not dia.loop_follows:
+        return say("The error of the velocity grows by {:.0f} %: the simulated controller is not the drive's.", growth)
+    varies = "beyond" if dia.gain_interval[1] < 0.0 else "within"
+    grows = say("The error of the velocity grows by {:.0f} %, {} its variation over the record", growth, varies)
+    before, after = dia.before.force_error, dia.after.force_error
+    if after is not None and (before is None or after < before):
+        was = "diverges without the effects" if before is None else f"was {number(before)}"
+        stands = ", and what is named stands by that" if any(not f.is_noise for f in dia.findings) else ""
+        return say("{}; that of the {torque} falls ({}, is {} {N m}){}: see the next table.", grows, was, number(after), stands)
+    if dia.controller is None:
+        return say("{}: the effects, as fitted, do not hold on these data.", grows)
+    text = (
+        "{}: the effects were found on the error of the model driven by the {torque}; closed over this controller (its gains, "
+        "rule and limits) or over other records they do not hold."
+    )
+    return say(text, grows)
 
 
 def _mechanics(dia: Diagnosis, axis: str) -> list[str]:

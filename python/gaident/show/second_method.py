@@ -17,6 +17,8 @@ def force_rows(dia: Diagnosis, axis: str) -> list[tuple[str, str, str]]:
         fits.append(("extended model", after.force_error, after.torque_rms))
     fits.append(("inverse-dynamics regression", dia.regression_force_error, after.torque_rms or before.torque_rms))
     rows = [(what, number(error), f"{100.0 * error / size:.1f}") for what, error, size in fits if error is not None and size]
+    if dia.model.effects and before.force_error is None and after.force_error is not None:
+        rows.insert(0, (fits[0][0], "diverges", ""))
     if rows and after.force_floor is not None:
         rows.append(("what noise leaves", number(after.force_floor), ""))
     return rows

@@ -123,6 +123,17 @@ def test_without_a_torque_there_is_no_check() -> None:
     assert check.regression is None and check.comparisons == () and check.after.force_error is None
 
 
+def test_a_model_that_diverges_along_the_motion_has_no_force_error() -> None:
+    """A pole far in the right half plane: the loop that leads it along the motion does not hold it."""
+    rec = record(coulomb_friction=FRICTION)
+    runs_away = ga.Model(1.0 / 3e-4, [2e4])
+    axis = ga.OneMass(3e-4, PLANT.D).model().with_effect("coulomb_friction", **FRICTION)
+    fitness = Fitness(1.0, 0.0, 0.1)
+    gains = Gains(fitness, fitness, (0.0, 0.0), "the rest", {}, ((rec, 4200),), runs_away, axis)
+    check = checked(DataSet.of([rec], PLANT.controller), gains, axis, {}, estimates({"coulomb_friction": FRICTION}))
+    assert check.before.force_error is None and check.after.force_error < 0.1 * check.after.torque_rms
+
+
 def test_what_does_not_move_has_no_regression_and_no_force_error() -> None:
     rng = np.random.default_rng(0)
     rec = ga.Record(1e-3, velocity=1e-3 * rng.standard_normal(5000), torque=1e-3 * rng.standard_normal(5000))

@@ -11,7 +11,9 @@ from drive_rig import skip_without_library
 from gaident.axis import Text
 from gaident.diagnosis.check import Check
 from gaident.diagnosis.explain.held_out import standing
-from gaident.diagnosis.gains import IN_SAMPLE, Gains, interval_of_fall
+from gaident.diagnosis.gains import Gains, interval_of_fall
+from gaident.diagnosis.held_parts import IN_SAMPLE, held_out_from, held_parts
+from gaident.diagnosis.linear_part import linear_of_part
 from gaident.results.diagnosis import Fitness
 
 MODEL = ga.OneMass(3e-4, 1e-3).model()
@@ -24,7 +26,9 @@ def gains(low: float, high: float, held_out: str = "the rest") -> Gains:
     return Gains(before, after, (low, high), held_out, {}, (), MODEL, MODEL)
 
 
-def check(before: float | None, after: float | None, better: bool = False, terms: tuple[str, ...] = ()) -> Check:
+def check(
+    before: float | None, after: float | None, better: bool = False, terms: tuple[str, ...] = (), loses: bool = False
+) -> Check:
     regression = None
     if terms:
         t = 1e-3 * np.arange(4000)
@@ -32,7 +36,7 @@ def check(before: float | None, after: float | None, better: bool = False, terms
         rec = ga.Record(1e-3, velocity=w, torque=2e-3 * 25.0 * np.cos(5.0 * t) + 0.01 * w + 0.1 * np.sign(w))
         regression = ga.inverse_dynamics(rec, terms=terms)
     force = [Fitness(1.0, 0.0, 0.1, force_error=x, torque_rms=1.0, force_floor=0.0) for x in (before, after)]
-    return Check(regression, None, (), force[0], force[1], (), Text(""), better)
+    return Check(regression, None, (), force[0], force[1], (), Text("the torque drives the simulation"), better, loses)
 
 
 def alone(effect: str) -> set[str]:
@@ -45,7 +49,6 @@ def alone(effect: str) -> set[str]:
     [
         (0.1, 0.5, 0.2, 0.1, True, True),  # the free run gains: what the regression leaves does not matter
         (-0.5, -0.1, 0.2, 0.3, False, False),  # both figures are worse
-        (-0.5, -0.1, 0.2, 0.1, False, True),  # speeds that are only held: the torque is explained, the free run drifts
         (-0.5, -0.1, None, None, False, False),  # no torque to go by
         (-0.02, -0.01, 0.2, 0.3, False, True),  # surely worse, by less than matters
         (-0.5, 0.1, 0.2, 0.3, False, True),  # a lower error within its variation decides nothing
@@ -61,13 +64,129 @@ def test_a_cause_that_the_regression_holds_has_a_second_witness() -> None:
     seen = check(0.2, 0.3, terms=("inertia", "viscous", "coulomb"))
     causes, why = standing(["torque_dead_band", "stribeck_friction"], gains(-0.5, -0.1), seen, alone)
     assert causes == ["stribeck_friction"] and len(why) == 1 and "no explanation" in why[0]
-    assert standing(["stribeck_friction"], gains(-0.5, -0.1), seen, alone) == (["stribeck_friction"], ())
+    causes, why = standing(["stribeck_friction"], gains(-0.5, -0.1), seen, alone)
+    assert causes == ["stribeck_friction"] and len(why) == 1
+    assert "no explanation by itself. Stribeck friction stands: the regression finds the same" in why[0]
+    # No gain, and a regression that is surely the better one, by less than matters: nothing is said of a cause that it has, too.
+    seen = check(0.2, 0.3, True, terms=("inertia", "viscous", "coulomb"))
+    assert standing(["stribeck_friction"], gains(-0.5, 0.1), seen, alone) == (["stribeck_friction"], ())
     # What the records cannot tell from it is the same witness.
     assert standing(["torque_dead_band"], gains(-0.5, -0.1), seen, lambda e: {"coulomb_friction"})[0] == ["torque_dead_band"]
 
 
-def test_in_sample_figures_decide_nothing() -> None:
-    assert standing(["backlash"], gains(-0.5, -0.1, IN_SAMPLE), check(0.2, 0.3), alone)[0] == ["backlash"]
+def test_a_name_that_stands_by_the_torque_says_so() -> None:
+    """The free run is worse and the force error smaller: gravity, or an axis that integrates."""
+    causes, why = standing(["unbalance", "coulomb_friction"], gains(-0.5, -0.1), check(0.2, 0.1), alone)
+    assert causes == ["unbalance", "coulomb_friction"] and len(why) == 1
+    assert "worse than that of the linear model" in why[0] and "stand by the torque" in why[0]
+    assert "falls from 0.2 to 0.1 N m, and the torque drives the simulation." in why[0]
+    causes, why = standing(["unbalance"], gains(-0.5, -0.1), check(None, 0.1), alone)
+    assert causes == ["unbalance"] and "the model without effects diverges" in why[0]
+
+
+def test_a_name_whose_model_leaves_far_more_of_the_torque_than_the_regression_is_none() -> None:
+    """Also where its free run is better than that of the linear model; what the regression has, too, stands."""
+    lost = check(0.4, 0.3, True, terms=("inertia", "viscous", "coulomb"), loses=True)
+    causes, why = standing(["torque_dead_band", "coulomb_friction"], gains(0.1, 0.5), lost, alone)
+    assert causes == ["coulomb_friction"] and "better than the linear one in free run, but leaves more of the torque" in why[0]
+    assert standing(["torque_dead_band"], gains(0.1, 0.5), lost, alone)[0] == []
+
+
+def moving(count: int, still: int = 0, before: int = 0, seed: int = 1, size: float = 20.0) -> ga.Record:
+    """Samples in motion between samples at rest, with noise of 0.03 rad/s."""
+    rng = np.random.default_rng(seed)
+    w = np.concatenate([np.zeros(before), size * np.sin(0.05 * np.arange(count)), np.zeros(still)])
+    return ga.Record(1e-3, velocity=w + 0.03 * rng.standard_normal(len(w)), torque=np.ones(len(w)))
+
+
+@pytest.mark.parametrize(
+    ("count", "still", "before", "at"),
+    [
+        (3000, 0, 0, 2100),  # of the time
+        (1800, 1200, 0, 1265),  # the end at rest: of the path
+        (1000, 0, 2000, 2702),  # the beginning at rest
+        (600, 2400, 0, None),  # too little is left to fit
+        (200, 0, 2800, None),  # too little is left to hold out
+    ],
+)
+def test_what_is_held_out_holds_motion(count: int, still: int, before: int, at: int | None) -> None:
+    rec = moving(count, still, before)
+    found = held_out_from(rec)
+    assert found is None if at is None else abs(found - at) < 30
+    if found is None:
+        assert held_parts([rec], [], None)[1:3] == (IN_SAMPLE, None)
+        return
+    parts = rec.velocity[:found], rec.velocity[found:]
+    assert all(np.sqrt(np.mean(w**2)) > 1.0 for w in parts)
+    paths = [np.sum(np.abs(w)) for w in parts]
+    assert paths[0] == pytest.approx(0.7 * sum(paths), rel=0.03)
+    words = held_parts([rec], [], None).words
+    assert words.startswith("the last 30 % of the record," if not still + before else "the last 30 % of its path,")
+
+
+def test_a_record_for_validation_at_rest_judges_nothing() -> None:
+    rec, still, other = moving(3000), moving(0, 1500, seed=2), moving(1500, seed=3)
+    held = held_parts([rec], [still], None)
+    assert held.part == (2100,) and held.scored == [(rec, 2100)]
+    assert (
+        "1 of the records for validation holds no motion" in held.notes[0] and "records that were given to fit" in held.notes[0]
+    )
+    held = held_parts([rec], [still, other], None)
+    assert held.scored == [(other, 0)] and held.words == "validation records" and len(held.notes) == 1
+    slow = moving(1500, seed=4, size=0.5)  # 1/40 of the speed, and 12 times the noise
+    assert held_parts([rec], [slow], None) == ([(slow, 0)], "validation records", None, ())
+
+
+def test_a_fall_of_the_error_at_standstill_is_none_and_is_said() -> None:
+    """Friction holds what the linear model lets drift: at rest the error falls by 99 %, and shows nothing."""
+    rec, still = friction_record(3000, 0), friction_record(0, 1500)
+    dia = ga.diagnose(rec, validation=still)
+    assert dia.held_out.startswith("the last 30 % of the record") and any("hold" in n and "no motion" in n for n in dia.notes)
+    dia = ga.diagnose(friction_record(600, 2400))
+    assert dia.held_out == IN_SAMPLE and "too little motion, to hold any out" in dia.summary()
+
+
+def friction_record(count: int, still: int) -> ga.Record:
+    """An axis with dry friction under torques that change, and at rest under torques that it holds."""
+    rng = np.random.default_rng(5)
+    torque = np.append(np.repeat(rng.uniform(-0.2, 0.2, count // 100), 100), 0.03 * np.sin(0.01 * np.arange(still)))
+    drive = ga.OneMass(1e-3, 3e-3).model().with_effect("coulomb_friction", torque=0.05)
+    w = ga.simulate(drive, ga.Record(1e-3, torque=torque, velocity=0.0 * torque))
+    return ga.Record(1e-3, velocity=w + 0.03 * rng.standard_normal(len(w)), torque=torque)
+
+
+def test_the_linear_model_is_one_of_the_samples_that_are_fitted() -> None:
+    """The end of this record has another inertia: what was identified on the whole record has seen it."""
+    rng = np.random.default_rng(2)
+    torque = np.repeat(rng.uniform(-0.2, 0.2, 30), 100)
+    w, parts = np.zeros(0), (torque[:2100], torque[2100:])
+    for J, u in zip((1e-3, 1.5e-3), parts, strict=True):
+        w = np.append(w, ga.simulate(ga.OneMass(J, 3e-3), ga.Record(1e-3, torque=u, velocity=0.0 * u)))
+    rec = ga.Record(1e-3, velocity=w + 0.03 * rng.standard_normal(len(w)), torque=torque)
+    idn = ga.identify(rec, seed=1)
+    first = linear_of_part(idn, [rec], None, (2100,))
+    assert 1.0 / first.gain == pytest.approx(1e-3, rel=0.01) and 1.0 / idn.model.gain > 1.05e-3
+    assert linear_of_part(idn, [rec], None, None) is idn.model
+
+
+def test_noise_of_a_torque_is_no_floor_beyond_the_motion_and_is_that_of_the_extended_model() -> None:
+    rng = np.random.default_rng(3)
+    torque = np.sin(0.05 * np.arange(4000)) + 0.05 * rng.standard_normal(4000)
+    rec = ga.Record(1e-3, velocity=10.0 * np.sin(0.05 * np.arange(4000)), torque=torque, torque_is="measured")
+    fit = Fitness(1.0, 0.0, 0.1)
+
+    def floor(mechanism: ga.Model, extended: ga.Model) -> float:
+        return Gains(fit, fit, (0.0, 0.0), "the rest", {}, ((rec, 2800),), mechanism, extended).floor
+
+    absurd, axis = ga.OneMass(1e-7, 1e-9).model(), ga.OneMass(1e-2, 1e-1).model()
+    assert 0.1 < floor(absurd, axis) == floor(axis, axis) < 0.2
+    assert floor(axis, absurd) == 0.1
+
+
+def test_in_sample_figures_take_no_name() -> None:
+    causes, why = standing(["backlash"], gains(-0.5, -0.1, IN_SAMPLE), check(0.2, 0.3), alone)
+    assert causes == ["backlash"] and "Even on the samples that were fitted" in why[0] and "not all that there is" in why[0]
+    assert standing(["backlash"], gains(-0.5, 0.1, IN_SAMPLE), check(0.2, 0.3, True), alone) == (["backlash"], ())
 
 
 def test_the_interval_of_a_fall_is_wide_where_errors_are_slow() -> None:

@@ -1,15 +1,19 @@
-"""What a diagnosis refuses: an effect that makes held-out data worse, and a mechanism that no axis is."""
+"""What a diagnosis refuses: an effect that makes held-out data worse or has no known size, and a mechanism that no axis is."""
 
 from __future__ import annotations
 
 import importlib
 from dataclasses import replace
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
 
 import gaident as ga
+from gaident.diagnosis.explain.determined import determined, not_determined
+from gaident.diagnosis.library.terms import LIBRARY
+from gaident.diagnosis.selection.attribution import of_known_size
 
 module = importlib.import_module("gaident.diagnosis.work")
 
@@ -64,6 +68,15 @@ def test_a_model_with_a_negative_damping_is_not_adequate(monkeypatch: pytest.Mon
     assert ga.diagnose(rec, controller).verdict == "explained"
 
 
+def test_a_negative_damping_is_said_beside_what_is_left_too(monkeypatch: pytest.MonkeyPatch) -> None:
+    rec, controller, true, judged = record(2), ga.PI(kp=0.02, ki=0.5), module.mechanics_of, module.Work.judged
+    driven = ga.Estimate(-0.01, 0.003, "N m s/rad")
+    monkeypatch.setattr(module, "mechanics_of", lambda *given: true(*given) | {"viscous_friction": driven})
+    monkeypatch.setattr(module.Work, "judged", lambda work: judged(work)._replace(driver="position"))
+    found = ga.diagnose(rec, controller)
+    assert found.driver == "position" and any("comes out negative" in note for note in found.notes)
+
+
 def test_that_none_is_named_is_said_only_where_none_is(monkeypatch: pytest.MonkeyPatch) -> None:
     true = module.mechanics_of
 
@@ -72,7 +85,7 @@ def test_that_none_is_named_is_said_only_where_none_is(monkeypatch: pytest.Monke
 
     monkeypatch.setattr(module, "mechanics_of", driven)
     for only, said in (("load_torque", "load torque the model would come closer still"), ("", "so none is named")):
-        monkeypatch.setattr(module, "only_describes", lambda *given, only=only: given[2] == only or not only)
+        monkeypatch.setattr(module.attribution, "only_describes", lambda *given, only=only: given[2] == only or not only)
         found = ga.diagnose(record(1), ga.PI(kp=0.02, ki=0.5))
         assert bool(found.causes) == bool(only)
         assert any(said in note for note in found.notes)
@@ -113,3 +126,47 @@ def test_a_viscous_friction_that_drives_the_axis_is_no_mechanism() -> None:
     assert mean == pytest.approx(0.02, rel=0.3)
     assert abs(dia.mechanics["viscous_friction"].value) < 3e-3 and dia.mechanics["inertia"].value == pytest.approx(1e-3, rel=0.1)
     assert dia.after.rmse < 0.7 * dia.before.rmse
+
+
+def estimate(value: float, std: float, unit: str = "N m", at_bound: bool = False) -> ga.Estimate:
+    return ga.Estimate(value, std, unit, at_bound, std < abs(value))
+
+
+def levels(up: tuple[float, float], down: tuple[float, float]) -> dict[str, ga.Estimate]:
+    slopes = {"viscous_positive": estimate(0.0038, 1.3e-5, "N m s/rad"), "viscous_negative": estimate(0.0, 0.0, "N m s/rad")}
+    return {"torque_positive": estimate(*up), "torque_negative": estimate(*down), **slopes}
+
+
+@pytest.mark.parametrize(
+    ("parameters", "known"),
+    [
+        (levels((0.038, 0.16), (0.0015, 0.16)), False),  # a load takes either level; the slopes are known, the friction is not
+        (levels((0.04, 0.001), (0.0, 0.001)), True),  # one level is 0, and known to be
+        ({"torque": estimate(0.05, 0.06)}, False),
+        ({"torque": estimate(0.05, 0.04)}, True),
+        ({"torque": estimate(0.05, float("nan"), at_bound=True)}, False),
+        ({"amplitude": estimate(0.02, 0.001), "order": estimate(6.0, 0.0, "1/turn"), "phase": estimate(0.0, 0.02, "rad")}, True),
+        ({"amplitude": estimate(0.02, 0.17), "order": estimate(6.0, 0.0, "1/turn"), "phase": estimate(1.5, 0.1, "rad")}, False),
+        ({"width": estimate(0.01, 0.001, "rad")}, True),
+    ],
+)
+def test_an_effect_is_determined_by_its_torques(parameters: dict[str, ga.Estimate], known: bool) -> None:
+    assert determined(parameters) is known
+
+
+def test_what_is_not_determined_is_said() -> None:
+    assert "Asymmetric friction comes closer" in not_determined("asymmetric_friction")
+
+
+def test_of_two_effects_that_take_each_others_size_the_one_goes_that_explains_less() -> None:
+    """Two levels beside a constant load: even friction in their place, and the load is known."""
+    terms = tuple(LIBRARY[e] for e in ("asymmetric_friction", "load_torque", "cogging"))
+    costs = {"asymmetric_friction": 900.0, "load_torque": 400.0, "coulomb_friction": 150.0}
+
+    def fit(what: str) -> Any:
+        return SimpleNamespace(bic=costs[what], what=what)
+
+    space: Any = SimpleNamespace(without=lambda final, e: fit(e), as_nested=lambda final, term, simple: fit(simple.name))
+    final: Any = SimpleNamespace(parameters=SimpleNamespace(terms=terms))
+    assert of_known_size(space, final, ["asymmetric_friction", "load_torque"]).what == "coulomb_friction"
+    assert of_known_size(space, final, ["load_torque"]).what == "load_torque"

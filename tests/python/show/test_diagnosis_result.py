@@ -182,17 +182,35 @@ def test_a_gain_that_is_none_is_not_called_one() -> None:
     result.before = Fitness(0.5, 97.0, 0.49)
     assert "it is at the noise with and without" in flat(summary(result))
     result.held_out = "in-sample"
-    assert "IN-SAMPLE" in summary(result)
+    assert "IN-SAMPLE: too little data, or too little motion, to hold any out" in flat(summary(result))
+
+
+def test_a_mechanism_that_diverges_along_the_motion_has_no_force_error() -> None:
+    result = fake()
+    assert "diverges" not in summary(result)
+    result.before = replace(result.before, force_error=None, torque_rms=None)
+    assert "mechanism without effects diverges" in flat(summary(result))
 
 
 def test_an_error_that_grows_is_said_to_and_not_to_be_compared() -> None:
     result = fake()
     result.after = Fitness(1.5, 80.0, 0.1)
     text = flat(summary(result))
-    assert "The error of the velocity grows by 200 %: this comparison is not valid" in text and "hardly" not in text
+    assert "grows by 200 %, within its variation over the record: the effects were found on" in text and "hardly" not in text
+    assert "closed over this controller" in text
+    result.controller = None
+    text = flat(summary(result))
+    assert "the record: the effects, as fitted, do not hold on these data." in text and "not the drive's" not in text
+    result.after = replace(result.after, force_error=0.0123, torque_rms=0.184)
+    result.gain_interval = (-3.0, -1.0)
+    text = flat(summary(result))
+    assert "grows by 200 %, beyond its variation over the record; that of the torque falls (was 0.0511, is 0.0123 N m)" in text
+    assert "that of the force falls" in flat(summary(result, "linear"))
+    result.before = replace(result.before, force_error=None)
+    assert "falls (diverges without the effects, is 0.0123 N m)" in flat(summary(result))
     result.loop_follows = False
     text = flat(summary(result))
-    assert "not valid, the simulated controller is not the drive's." in text
+    assert "grows by 200 %: the simulated controller is not the drive's." in text
     assert "(see above): the logged torque drives these models, no loop is closed." in text
     result.torque_logged = False
     text = flat(summary(result))

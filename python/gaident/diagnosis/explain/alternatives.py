@@ -4,19 +4,28 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
 
+from gaident.diagnosis.experiments.excitation import Excitation
 from gaident.diagnosis.library.equivalences import equivalents, impossible
 from gaident.diagnosis.library.sides import name_of
-from gaident.diagnosis.library.terms import LIBRARY, level_of
+from gaident.diagnosis.library.terms import LIBRARY, conditional_classes, level_of
 from gaident.diagnosis.selection.offset import Offset
 from gaident.diagnosis.selection.other_gains import OTHER_GAINS
 from gaident.diagnosis.selection.rivals import Replacement
 from gaident.models.effect_rows import SHAFT
 from gaident.results.estimate import Estimate
 
-__all__ = ["alternatives_of", "impossible_here"]
+__all__ = ["alike_here", "alternatives_of", "impossible_here"]
 
 OF_THE_CONTROLLER = (OTHER_GAINS, "torque_filter")
 """What a controller that is not the drive's may lack, in words of the findings."""
+
+
+def alike_here(effect: str, excited: Excitation, torque_logged: bool) -> set[str]:
+    """What these records cannot tell from an effect, whatever their noise, for lack of reversals or of sizes of steps."""
+    # Speeds held in either direction, in whichever record, split what a reversal splits.
+    turns = max(excited.reversals, int(min(excited.speeds, default=0.0) < 0.0 < max(excited.speeds, default=0.0)))
+    effect = name_of(effect)
+    return set().union(*(c for c in conditional_classes(turns, len(excited.steps), torque_logged) if effect in c)) - {effect}
 
 
 def alternatives_of(

@@ -25,6 +25,7 @@ torque does not jump.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -149,6 +150,19 @@ def simplified(space: Moves, final: Fit, left: Dependence) -> Fit:
             if of_its_size and share(space, simpler, final, left) < space.policy.stands:
                 return simpler
     return final
+
+
+def of_known_size(space: Moves, final: Fit, unknown: Sequence[str]) -> Fit:
+    """The model without one of the effects whose size the records do not tell, or with a simpler one in its place.
+
+    Two effects that are the same torque take each other's size: without one of them the other one's is known.
+    Of all these models it is the one that comes closest.
+    """
+    less = []
+    for term in (t for t in final.parameters.terms if t.name in unknown):
+        less.append(space.without(final, term.name))
+        less += [space.as_nested(final, term, LIBRARY[name]) for name in term.nested]
+    return min(less, key=lambda f: f.bic)
 
 
 def share(space: Moves, without: Fit, final: Fit, left: Dependence) -> float:

@@ -237,7 +237,8 @@ def _gain(dia: Diagnosis, view: View, drawn: Charts) -> Section:
     parts: list[str] = []
     if dia.held_out == "in-sample":
         text = (
-            "In-sample: there were too few data to hold any out. Parameters were fitted to the same samples: this flatters them."
+            "In-sample: there were too few data, or too little motion, to hold any out. Parameters were fitted to the same "
+            "samples: this flatters them."
         )
         parts.append(box(tag("p", text), kind="warn"))
     else:
