@@ -191,7 +191,7 @@ def _of_regression(found: InverseDynamics) -> dict[str, Estimate]:
     """Without what it could not try, and without gravity or a spring where the other of the two stands."""
     parameters = found.parameters
     rows = {"inertia": parameters["inertia"]}
-    untold = {text.partition(":")[0] for text in found.not_tried}
+    untold = found.terms_not_tried
     if any(name.startswith("coulomb") for name in parameters):
         rows["dry friction"] = level_of({name.replace("coulomb", "torque"): e for name, e in parameters.items()})
     elif "coulomb" not in untold:

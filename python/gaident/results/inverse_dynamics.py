@@ -62,6 +62,8 @@ class InverseDynamics:
         Terms that these records cannot show, with the reason.
     digests : tuple of str
         Digests of the records, see `Record.digest`.
+    terms_not_tried : tuple of str
+        The terms of `not_tried` alone.
 
     See Also
     --------
@@ -87,6 +89,7 @@ class InverseDynamics:
     rivals: tuple[tuple[tuple[str, ...], float], ...]
     not_tried: tuple[str, ...]
     digests: tuple[str, ...]
+    terms_not_tried: tuple[str, ...] = ()
 
     def torque(self, record: Record) -> NDArray[np.float64]:
         """Return the torque that this motion needs [N m], shape (n,) like `record.velocity`.
@@ -118,6 +121,7 @@ class InverseDynamics:
         """The inverse of `to_dict`. Raises GaidentError where the data are something else."""
         with undamaged("regression"):
             lists = {name: tuple(data[name]) for name in ("terms", "coefficients", "not_tried", "digests")}
+            lists["terms_not_tried"] = tuple(data.get("terms_not_tried", ()))  # not in the files of earlier versions
             rivals = tuple((tuple(terms), float(worse)) for terms, worse in data["rivals"])
             parameters = {name: Estimate(**e) for name, e in data["parameters"].items()}
             return cls(**{**data, **lists, "rivals": rivals, "parameters": parameters})

@@ -162,6 +162,7 @@ def inverse_dynamics(
         rivals=_rivals(scores, chosen),
         not_tried=() if asked is not None else tuple(say("{}: {}", name, reason) for name, reason in refused.items()),
         digests=tuple(r.digest for r in records),
+        terms_not_tried=() if asked is not None else tuple(refused),
     )
     if rank < len(theta):
         result = replace(result, not_tried=(*result.not_tried, "the motion does not tell all terms apart: deviations of inf"))

@@ -70,7 +70,7 @@ def jump_at_reversal(records: Sequence[Record], cutoff_hz: float | None = None) 
         found = inverse_dynamics(list(records), cutoff_hz=cutoff_hz)
     except GaidentError:
         return None
-    if any(text.partition(":")[0] == "coulomb" for text in found.not_tried):
+    if "coulomb" in found.terms_not_tried:
         return None
     kept = tuple(t for t in found.terms if t not in (*DIRECTED, "coulomb"))
     viscous = () if any(t.startswith("viscous") for t in kept) else ("viscous",)
