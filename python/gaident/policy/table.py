@@ -93,7 +93,7 @@ class Decisions:
     most_effects: int = gain(4, "1", "effects in one model at most", DRIVES)
     harm: float = gain(0.02, "1", "part of the held-out error that an effect may add before it is refused", REAL)
     fitted_share: float = gain(0.7, "1", "part of a record to which parameters are fitted where the rest is held out", REAL)
-    least_fitted: float = gain(0.25, "1", "the same at least where the path is cut; less is not enough, and nothing is held out", REAL)
+    least_fitted: float = gain(0.25, "1", "the same at least where the path is cut; else nothing is held out", REAL)
     least_held_out: int = gain(600, "samples", "length of a record from which a part of it is held out", REAL)
     interval_level: float = gain(
         0.05, "probability", "outside the interval of a fall of the error: below 0 as a whole, it is harm", REAL
