@@ -86,7 +86,7 @@ def _penalty(selection: Selection) -> float | None:
     objective = space.objective
     fresh = Objective(objective.data, objective.weight, objective.family, objective.measured)  # that remembers no growth
     one, two = (
-        replace(space, objective=fresh, policy=replace(POLICY, effect_penalty=p, hope=-1e9), note=lambda _: None, grown={})
+        replace(space, objective=fresh, policy=replace(POLICY, effect_penalty=p, hope=-1e9), note=lambda _: None)
         for p in (1.0, 2.0)
     )
     with np.errstate(over="ignore", invalid="ignore"):

@@ -21,8 +21,10 @@ DIGITS = range(1, 10)  # no decision: significant digits that text logs are writ
 
 def changes(values: Vector) -> Vector:
     """By how much neighbouring samples differ, without sign (n - 1,); 0 where that is what a sum in floating point loses."""
-    steps = np.abs(np.diff(values))
-    return np.where(steps > SAME * float(np.abs(values).max(initial=0.0)), steps, 0.0)
+    steps = np.diff(values)
+    np.abs(steps, out=steps)  # in place: records may be long
+    steps[steps <= SAME * float(max(values.max(initial=0.0), -values.min(initial=0.0)))] = 0.0
+    return steps
 
 
 def lattice_step(values: Vector, rounded: bool = False) -> float:
