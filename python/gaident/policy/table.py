@@ -124,6 +124,9 @@ class Decisions:
     dependence_gain: float = calibrated(
         NOISE, "dependence_gain", "BIC units", "of a free function of one signal: above, the errors depend on that signal"
     )
+    driver_share: float = noise(
+        0.005, "1", "of the squared error before whitening, that a function of a signal takes away at least, to be told", DRIVES
+    )
     effort_ratio: float = noise(1.1, "1", "rms of whitened errors over the noise: below, no further effect is looked for", DRIVES)
     immaterial: float = noise(0.02, "1", "part of the linear mechanism's rms error that always counts as noise", DRIVES)
     grid_loss: float = noise(

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import gaident as ga
-from gaident.diagnosis.selection.dependence import _strongest, dependence
+from gaident.diagnosis.selection.dependence import Dependence, _strongest, dependence
 from gaident.estimation.dataset import DataSet
 from gaident.estimation.noise_model import WHITE
 from gaident.estimation.objective import Hypothesis, Objective, OutputErrors
@@ -63,3 +63,13 @@ def test_the_driver_of_output_errors_is_chosen_by_the_errors_that_it_is_tested_b
     apart = replace(found[1], least={"time": 1.0, "velocity": 2.0}, unwhitened={"time": 2.0, "velocity": 1.0})
     apart = replace(apart, gains={"time": 80.0, "velocity": 60.0}, needed=47.0)
     assert apart.strongest == apart.driver == "velocity" and replace(apart, whitened=True).driver == "time"
+
+
+def test_a_driver_takes_away_a_share_of_the_error_whatever_its_gain() -> None:
+    """With many exact samples what nobody would miss gains BIC units; one frequency is small by nature, and is told."""
+    gains, least = {"position": 300.0, "time": 100.0}, {"position": 0.9998, "time": 0.9999}
+    left = Dependence(gains, least, dict(least), needed=50.0, rest=1.0)
+    assert left.strongest == "position" and left.driver is None
+    assert replace(left, unwhitened={"position": 0.98, "time": 0.9999}).driver == "position"
+    hum = replace(left, gains={"position": 10.0, "time": 100.0}, line=(50.0, 0.01))
+    assert hum.driver == "time" and replace(hum, line=None).driver is None

@@ -36,6 +36,7 @@ class Dependence:
     """Gains [BIC units] by driver, and the strongest where it counts, from `needed` on.
 
     least: squared raw errors beside each driver's family; unwhitened: the same before whitening, by which output errors count.
+    rest: the squared errors before whitening beside the model alone.
     """
 
     gains: dict[str, float]
@@ -44,6 +45,7 @@ class Dependence:
     needed: float
     line: tuple[float, float] | None = None  # (frequency [Hz], torque [N m]) where "time" is one
     whitened: bool = True
+    rest: float = 0.0
 
     @property
     def strongest(self) -> str | None:
@@ -56,7 +58,17 @@ class Dependence:
     def driver(self) -> str | None:
         """The driver that explains most, None where nothing significant is left."""
         name = self.strongest
-        return name if name is not None and self.gains[name] > self.needed else None
+        return name if name is not None and self.gains[name] > self.needed and self.matters(name) else None
+
+    def matters(self, driver: str) -> bool:
+        """Whether a function of it takes away a share of the error before whitening.
+
+        With many samples and exact ones, what no user would miss is significant. A single frequency is looked for beyond the
+        family of its driver, and is small by nature.
+        """
+        if driver == "time" and self.line is not None:
+            return True
+        return self.unwhitened[driver] <= (1.0 - POLICY.driver_share) * self.rest
 
 
 def dependence(objective: Objective, fit: Fit) -> Dependence:
@@ -83,7 +95,8 @@ def dependence(objective: Objective, fit: Fit) -> Dependence:
     unwhitened = {driver: objective.unwhitened_rest(rows, error) for driver, rows in beside.items()}
     whitened = isinstance(objective.family, Innovations)
     needed = POLICY.dependence_gain * (1.0 + (POLICY.short_record / objective.count if whitened else 0.0))
-    return Dependence({driver: float(gain) for driver, gain in gains.items()}, least, unwhitened, needed, line, whitened)
+    rest = objective.unwhitened_rest(J, error)
+    return Dependence({driver: float(gain) for driver, gain in gains.items()}, least, unwhitened, needed, line, whitened, rest)
 
 
 def families(objective: Objective, fit: Fit) -> dict[str, Matrix]:
