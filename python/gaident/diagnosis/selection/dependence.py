@@ -63,8 +63,8 @@ class Dependence:
     def matters(self, driver: str) -> bool:
         """Whether a function of it takes away a share of the error before whitening.
 
-        With many samples and exact ones, what no user would miss is significant. A single frequency is looked for beyond the
-        family of its driver, and is small by nature.
+        With many exact samples, what no user would miss is significant.
+        A single frequency is looked for beyond the family of its driver, and is small by nature.
         """
         if driver == "time" and self.line is not None:
             return True
