@@ -12,7 +12,7 @@ from gaident.axis import Text, say
 from gaident.control.controller import Controller, checked_controller
 from gaident.control.pi import bare_pi
 from gaident.data.record import Record
-from gaident.diagnosis.controller.as_read import outliers_of_the_log
+from gaident.diagnosis.controller.as_read import in_terms_of_the_log, outliers_of_the_log
 from gaident.diagnosis.controller.driving import Driving, driving_of
 from gaident.diagnosis.controller.form_findings import loop_of
 from gaident.diagnosis.note import Note
@@ -115,16 +115,17 @@ def diagnose(
     """
     began = time.perf_counter()
     note = Note(progress)
-    given = records_of(rec, "rec")
+    recorded = records_of(rec, "rec")
+    apart = () if validation is None else records_of(validation, "validation")
     import scipy.linalg  # noqa: F401  brings a BLAS of its own, to be limited too
     from threadpoolctl import threadpool_limits
 
     # A sum that several threads share is rounded otherwise with each number of them, and a search follows the last digit.
     with threadpool_limits(1, user_api="blas"), np.errstate(over="ignore", invalid="ignore"):
-        given, lines = outliers_of_the_log(given, checked_controller(controller))
+        given, lines = outliers_of_the_log(recorded, checked_controller(controller))
         asked = loop_of(given, checked_controller(controller))
         driven = torque_driven(given, asked.controller)
-    kept = () if validation is None else outliers_of_the_log(records_of(validation, "validation"), asked.controller)[0]
+    kept = outliers_of_the_log(apart, asked.controller)[0]
     records, validating = driven.records, torque_driven(kept, asked.controller).records if kept else ()
     checked(records, validating, driven.loop, identification, bootstrap, seed, progress, axis, pitch)
     origin = {r.digest: whole for r, whole in zip((*records, *validating), (*given, *kept), strict=True)}
@@ -184,6 +185,8 @@ def diagnose(
             found, noise=noise_std, bootstrap=bootstrap, controller_numbers=driving.numbers, velocity_age=work.data.age
         )
         result = driving.moved.noted(result)
+        pairs = zip((*given, *kept), (*recorded, *apart), strict=True)
+        result = in_terms_of_the_log(result, {read.digest: logged for read, logged in pairs})
         if result.relevance is not None:
             velocity, torque = (asked_accuracy.get(name) for name in ("velocity", "torque"))
             wanted = replace(result.relevance, velocity_accuracy=velocity, torque_accuracy=torque)

@@ -116,6 +116,7 @@ def test_at_the_rate_of_the_log_the_torque_says_whether_the_controller_read_an_o
     dia = ga.diagnose(spoiled, CONTROLLER)
     assert dia.verdict == "adequate" and [f.effect for f in dia.findings] == ["outliers"], dia.summary()
     assert dia.mechanics["inertia"].value == pytest.approx(J, rel=2e-3)
+    assert dia.digests == (spoiled.digest,) and dia.records == (spoiled,), "the result is of the log that was given"
 
 
 def test_a_replay_is_made_once_for_a_record_and_kept_no_longer_than_it() -> None:

@@ -5,7 +5,8 @@ Where a torque is logged it tells which: an outlier that the controller read is 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,13 +14,16 @@ from numpy.typing import NDArray
 from gaident.control.cascade import Cascade, cascade_of
 from gaident.control.controller import Controller
 from gaident.data.record import Record
+from gaident.data.signals.lattice import digits_step, lattice_step
 from gaident.diagnosis.controller.slow_forms import run_error
 from gaident.diagnosis.records.hygiene import cleaned, outliers
 from gaident.identification.logged_stretches import log_of
 from gaident.identification.logged_torque import tells_of_controller
 from gaident.models.starts import noise_std
+from gaident.policy.table import POLICY
+from gaident.results.diagnosis import Diagnosis
 
-__all__ = ["as_read", "outliers_of_the_log"]
+__all__ = ["as_read", "in_terms_of_the_log", "outliers_of_the_log"]
 
 Lines = NDArray[np.intp]
 Vector = NDArray[np.float64]
@@ -91,4 +95,22 @@ def _answered(rec: Record, lines: Lines, cascade: Cascade) -> Record:
     x, *_ = np.linalg.lstsq(np.diff(columns, axis=0), np.diff(rec.torque - before), rcond=None)
     moved = w.copy()
     moved[lines] += x
+    # The encoder, and the log, round these velocities as they round the others.
+    others = np.delete(w, lines)
+    for step, surely in ((lattice_step(others, rounded=True), True), (digits_step(others), False)):
+        on_it = step * np.round(moved[lines] / step) if step > 0.0 else moved[lines]
+        if not surely or np.all(np.abs(on_it - moved[lines]) < POLICY.on_lattice * step):
+            moved[lines] = on_it
     return rec.with_channels(velocity=moved)
+
+
+def in_terms_of_the_log(result: Diagnosis, logged: Mapping[str, Record]) -> Diagnosis:
+    """The result with the records as they were logged; logged: digest of a record as its controller read it -> the logged one."""
+    records, validation = ([logged.get(r.digest, r) for r in part] for part in (result.records, result.validation_records))
+    return replace(
+        result,
+        records=tuple(records),
+        validation_records=tuple(validation),
+        digests=tuple(r.digest for r in records),
+        validation_digests=tuple(r.digest for r in validation),
+    )
