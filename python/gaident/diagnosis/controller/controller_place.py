@@ -102,7 +102,7 @@ def as_logged(records: Sequence[Record], controller: PI | None) -> AsLogged:
             "{torque} constant). If the gains are as given, {inertia}, friction and every other {torque} below are {:.4g} times "
             "as large."
         )
-        used = joined("", (used, say(either, controller.kp / kp)))
+        used = joined("", (used, say(either, 1.0 / abs(off[0].value))))
     shown = replace(controller, kp=kp, ki=ki)
     return AsLogged(shown, (off[0].sentence, used), (_gains_finding(logged, shown, replays),))
 
