@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -73,7 +74,7 @@ class Gains:
         """Fall of the error that one effect brought, as a fraction of the error before it."""
         return self.steps.get(effect, 0.0)
 
-    @property
+    @cached_property
     def floor(self) -> float:
         """Rms error [rad/s] that noise leaves of a free run: of the velocity, and of a measured torque that drives the model.
 

@@ -97,10 +97,12 @@ def _answered(rec: Record, lines: Lines, cascade: Cascade) -> Record:
     moved[lines] += x
     # The encoder, and the log, round these velocities as they round the others.
     others = np.delete(w, lines)
-    for step, surely in ((lattice_step(others, rounded=True), True), (digits_step(others), False)):
-        on_it = step * np.round(moved[lines] / step) if step > 0.0 else moved[lines]
-        if not surely or np.all(np.abs(on_it - moved[lines]) < POLICY.on_lattice * step):
-            moved[lines] = on_it
+    for step, reach in ((lattice_step(others, rounded=True), POLICY.on_lattice), (digits_step(others), np.inf)):
+        if not step > 0.0:
+            continue
+        rounded = step * np.round(moved[lines] / step)
+        if np.all(np.abs(rounded - moved[lines]) < reach * step):
+            moved[lines] = rounded
     return rec.with_channels(velocity=moved)
 
 

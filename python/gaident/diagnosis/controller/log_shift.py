@@ -29,6 +29,7 @@ from gaident.axis import Text, called, joined, say
 from gaident.control.pi import PI
 from gaident.data.record import Record
 from gaident.data.torque_kind import MEASURED
+from gaident.diagnosis.controller.as_read import in_terms_of_the_log
 from gaident.estimation.criterion import gained
 from gaident.estimation.regression.torque_lag import TorqueLag, torque_lag
 from gaident.identification.notes import reading_notes
@@ -59,16 +60,8 @@ class Aligned:
 
     def noted(self, result: Diagnosis) -> Diagnosis:
         """The result, in terms of the records that were given."""
-        records, validation = ([self.given[r.digest] for r in part] for part in (result.records, result.validation_records))
-        return replace(
-            result,
-            notes=(*self.notes, *result.notes),
-            log_shifts=self.shifts,
-            records=tuple(records),
-            validation_records=tuple(validation),
-            digests=tuple(r.digest for r in records),
-            validation_digests=tuple(r.digest for r in validation),
-        )
+        given = in_terms_of_the_log(result, self.given)
+        return replace(given, notes=(*self.notes, *result.notes), log_shifts=self.shifts)
 
 
 def aligned(records: Sequence[Record], validation: Sequence[Record], controller: PI | None, follows: bool = False) -> Aligned:

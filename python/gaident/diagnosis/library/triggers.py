@@ -296,11 +296,9 @@ def orders_beyond(s: Motions) -> Text | None:
     """Orders of the angle too low for the travel, or too high for the sampling."""
     one = _per_turn(s)
     travelled = s.travel * one / TURN  # periods of the first order
-    least = (
-        1
-        if travelled > POLICY.seen_turn
-        else math.ceil(POLICY.seen_periods / max(travelled, POLICY.seen_periods / HIGHEST_ORDER))
-    )
+    least = math.ceil(POLICY.seen_periods / travelled) if travelled > 0.0 else HIGHEST_ORDER
+    if least == 2 and travelled > POLICY.seen_turn:  # no decision: the second order, below which the first one shows
+        least = 1
     per_sample = max(_slowest_held(m) * m.dt for m in s.records)
     fastest = math.floor(POLICY.seen_band * math.pi / per_sample / one) if per_sample > 0.0 else None
     below = say("orders below {} need more than the {} travelled", order(least * one), turns(s.travel))
