@@ -1,10 +1,4 @@
-from .diagnosis_plots import (
-    plot_evidence,
-    plot_orders,
-    plot_residual,
-    plot_reversals,
-    plot_torque_velocity,
-)
+from .diagnosis_plots import plot_evidence
 from .plots import (
     plot_bode,
     plot_convergence,
@@ -23,12 +17,8 @@ __all__ = [
     "plot_convergence",
     "plot_evidence",
     "plot_identification",
-    "plot_orders",
     "plot_poles_zeros",
-    "plot_residual",
     "plot_response",
-    "plot_reversals",
     "plot_structures",
-    "plot_torque_velocity",
     "progress",
 ]

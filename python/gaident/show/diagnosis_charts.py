@@ -121,16 +121,16 @@ def missing_over_velocity(velocity: Vector, dhat: Vector, dt: float, std: float,
     return Chart("missing-velocity", f"velocity [{velocity_unit(axis)}]", (panel,), text, height=420)
 
 
-def missing_orders(position: Vector, dhat: Vector, velocity: Vector, axis: str, highest: float | None = None) -> Chart:
+def missing_orders(position: Vector, dhat: Vector, velocity: Vector, axis: str) -> Chart:
     """Lines per turn, on a linear axis per metre, in the missing torque, with the level that chance hardly passes.
 
-    highest: order up to which they are drawn; None: 40 per turn, 200 in the travel of a linear axis.
+    Drawn up to 40 per turn, on a linear axis to 200 in the travel.
     Without a trace where the record travels too little.
     """
     rotary = axis == "rotary"
     travel = float(np.ptp(position))
     scale = 1.0 if rotary else travel or 1.0
-    top_order = highest if highest is not None else 40.0 if rotary else 200.0
+    top_order = 40.0 if rotary else 200.0
     lines = order_lines(position if rotary else position * (math.tau / scale), dhat, velocity, top_order)
     name, y = "order [per turn]" if rotary else "lines [1/m]", f"amplitude [{unit('N m', axis)}]"
     text = (

@@ -47,9 +47,7 @@ def chart_figure(chart: Chart, width: float, height: float, titles: Sequence[str
     return fig
 
 
-def grid_figure(
-    charts: Sequence[Sequence[Chart]], width: float, height: float, titles: Sequence[str], bold: bool = False
-) -> Figure:
+def grid_figure(charts: Sequence[Sequence[Chart]], width: float, height: float, titles: Sequence[str]) -> Figure:
     """Charts of one panel each, in rows and columns; titles: theirs, row by row."""
     fig = new_figure(width, height)
     axes = fig.subplots(len(charts), len(charts[0]), squeeze=False)
@@ -57,7 +55,7 @@ def grid_figure(
     for (ax, chart), title in zip(drawn, titles, strict=True):
         draw_panel(ax, chart, chart.panels[0])
         label_x(ax, chart)
-        headed(ax, title, bold)
+        headed(ax, title, bold=True)
     tidy(fig)
     for ax, _ in drawn:
         _plain_decades(ax)

@@ -1,4 +1,4 @@
-"""Pictures of a diagnosis: the numbers they draw are right, every kind renders, no state is left behind."""
+"""The picture of a diagnosis: the numbers they draw are right, every kind renders, no state is left behind."""
 
 from __future__ import annotations
 
@@ -11,8 +11,10 @@ import numpy as np
 import pytest
 
 from gaident.errors import SettingsError
-from gaident.show import plot_evidence, plot_orders, plot_residual, plot_reversals, plot_torque_velocity
+from gaident.show import plot_evidence
+from gaident.show.diagnosis_charts import missing_reversals
 from gaident.show.diagnosis_numbers import binned_mean, branches, order_lines, reversal_averages, spectrum
+from gaident.show.draw import picture
 
 DT = 1e-3
 N = 4000
@@ -100,39 +102,48 @@ def test_white_noise_stands_at_its_floor_and_a_hum_at_its_frequency() -> None:
     assert np.median(found.density[quiet]) == pytest.approx(0.2 * math.sqrt(2.0 * DT), rel=0.1)
 
 
+def panels(figure: Any) -> dict[str, Any]:
+    """The panels of the evidence, by letter."""
+    return {ax.get_title(loc="left")[0]: ax for ax in figure.axes}
+
+
 def test_torque_against_velocity_draws_both_branches_and_the_named_curve() -> None:
     grid = np.linspace(-60.0, 60.0, 50)
-    figure = plot_torque_velocity(
-        VELOCITY, FRICTION + 0.01 * NOISE, DT, std=0.01, curve=(grid, -0.05 * np.sign(grid), "Coulomb friction")
-    )
-    (ax,) = figure.axes
+    missing, named = FRICTION + 0.01 * NOISE, (grid, -0.05 * np.sign(grid), "Coulomb friction")
+    figure = plot_evidence(TIME, VELOCITY, VELOCITY, missing, POSITION, FRICTION, 0.1, std=0.01, curve=named)
+    ax = panels(figure)["b"]
+    figure.draw_without_rendering()
     labels = [text.get_text() for text in ax.get_legend().get_texts()]
     assert ax.get_legend().get_window_extent().y0 >= ax.get_window_extent().y1  # no point is covered
     assert sorted(labels) == sorted(["±2 std of the estimate", "accelerating", "decelerating", "Coulomb friction", "mean ± sd"])
     assert ax.get_ylabel() == "missing torque [N m]" and ax.get_xlabel() == "velocity [rad/s]"
     rendered(figure)
-    linear = plot_torque_velocity(VELOCITY, FRICTION, DT, axis="linear").axes[0]
+    linear = panels(plot_evidence(TIME, VELOCITY, VELOCITY, FRICTION, POSITION, FRICTION, 0.1, axis="linear"))["b"]
     assert linear.get_ylabel() == "missing force [N]" and linear.get_xlabel() == "velocity [m/s]"
     with pytest.raises(SettingsError, match="axis is 'round'"):
-        plot_torque_velocity(VELOCITY, FRICTION, DT, axis="round")
+        plot_evidence(TIME, VELOCITY, VELOCITY, FRICTION, POSITION, FRICTION, 0.1, axis="round")
 
 
 def test_orders_reversals_and_residual_render() -> None:
-    lines = plot_orders(POSITION, 0.02 * np.sin(6.0 * POSITION), VELOCITY)
-    assert "6" in [text.get_text() for text in lines.axes[0].texts]
-    rendered(lines)
-    few = plot_orders(0.001 * POSITION, NOISE, VELOCITY)
-    assert "too few" in few.axes[0].texts[0].get_text()
-    rendered(few)
-    rendered(plot_reversals(VELOCITY, FRICTION, np.repeat([0.1, 0.5], N // 2), DT))
-    none = plot_reversals(80.0 + VELOCITY, FRICTION, FRICTION, DT)
-    assert none.axes[0].texts[0].get_text() == "no reversals in the record"
-    assert not any(len(ax.get_xticks()) or len(ax.get_yticks()) for ax in none.axes)
-    rendered(none)
-    residual = plot_residual(TIME, 0.3 * NOISE, 0.3, after=0.1 * NOISE)
-    floor = [line for line in residual.axes[1].lines if line.get_label() == "white noise of the sensor"]
+    ripple = 0.02 * np.sin(6.0 * POSITION)
+    figure = plot_evidence(
+        TIME, VELOCITY, VELOCITY - 0.3 * NOISE, ripple, POSITION, FRICTION, 0.3, extended=VELOCITY - 0.1 * NOISE
+    )
+    drawn = panels(figure)
+    assert "6" in [text.get_text() for text in drawn["d"].texts]
+    floor = [line for line in drawn["e"].lines if line.get_label() == "white noise of the sensor"]
     assert floor[0].get_ydata()[0] == pytest.approx(0.3 * math.sqrt(2.0 * DT))
-    rendered(residual)
+    rendered(figure)
+    one_way = plot_evidence(TIME, 80.0 + VELOCITY, VELOCITY, NOISE, 0.001 * POSITION, FRICTION, 0.1)
+    drawn = panels(one_way)
+    assert "too few" in drawn["d"].texts[0].get_text()
+    assert drawn["f"].texts[0].get_text() == "no reversals in the record"
+    assert not len(drawn["f"].get_xticks()) and not len(drawn["f"].get_yticks())
+    rendered(one_way)
+    for velocity in (VELOCITY, 80.0 + VELOCITY):  # as the report draws it, the velocity below
+        averaged = missing_reversals(velocity, FRICTION, np.repeat([0.1, 0.5], N // 2), DT, "rotary")
+        assert len(averaged.panels) == 2 and bool(averaged.panels[0].note) == (velocity is not VELOCITY)
+        assert picture(averaged).startswith(b"\x89PNG")
 
 
 def test_the_evidence_at_a_glance() -> None:
