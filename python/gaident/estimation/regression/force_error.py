@@ -35,7 +35,7 @@ from gaident.models.simulate import run, simulate
 from gaident.policy.table import POLICY
 from gaident.results.inverse_dynamics import InverseDynamics
 
-__all__ = ["FilteredRecords", "ForceError", "band_of", "effects_before_the_shaft", "force_error", "needed_torque"]
+__all__ = ["FilteredRecords", "ForceError", "band_of", "effects_before_the_shaft", "force_error"]
 
 Vector = NDArray[np.float64]
 TorqueOf = Callable[[Record], Vector]
@@ -184,17 +184,6 @@ class FilteredRecords:
         return ForceError(rms if math.isfinite(rms) else math.inf, size, least, self.cutoff_hz, self.order, count)
 
 
-def needed_torque(model: Model, rec: Record, cutoff_hz: float, order: int = ORDER) -> Vector:
-    """The torque [N m] with which the model's mechanism moves as the filtered motion of a record, an array (n,).
-
-    Effects of the actuator, and a sensor's filter, act on the torque before and are left out here; see `force_error`.
-    A commanded torque is held over each sample, so its mean over the sample is given;
-    beside a measured torque the value at the sample.
-    Raises ModelError where the model cannot be led along a motion.
-    """
-    return _led(model, rec, motion_of(rec, cutoff_hz, order), cutoff_hz)
-
-
 def band_of(model: object, records: Sequence[Record], order: int = ORDER, below: float = POLICY.swing_band) -> float:
     """The cutoff [Hz] over these records: the regression's, at most `below` times the model's lowest antiresonance."""
     zeros = [abs(z) for z in model.zeros if z.imag > 0.0] if isinstance(model, Model) else []
@@ -243,7 +232,11 @@ def _at_shaft(model: Model, rec: Record) -> Vector:
 
 
 def _led(model: Model, rec: Record, motion: Motion, cutoff_hz: float) -> Vector:
-    """The torque of a stiff loop that leads the model's mechanism along a filtered motion."""
+    """The torque of a stiff loop that leads the model's mechanism along a filtered motion [N m] (n,).
+
+    A commanded torque is held over each sample, so its mean over the sample is given; beside a measured torque the value at the
+    sample.
+    """
     from scipy.interpolate import CubicSpline
 
     if model.p != 1 or not model.gain > 0.0 or any(z.real > 0.0 for z in model.zeros):
