@@ -130,6 +130,7 @@ struct OwnEffect {
 };
 
 OwnPlace own_place_named(const std::string& name) {
+    if (name == "command") return OwnPlace::command;
     if (name == "torque") return OwnPlace::torque;
     if (name == "friction") return OwnPlace::friction;
     if (name == "actuator") return OwnPlace::actuator;
@@ -137,7 +138,7 @@ OwnPlace own_place_named(const std::string& name) {
     throw std::invalid_argument("own: '" + name + "' is no place for an effect of one's own");
 }
 
-// Python functions as own effects: function(velocity, angle, torque, time, *parameters), arrays of one number per lane, read only
+// Python functions as own effects: function(velocity, angle, torque, command, time, *parameters), arrays of one number per lane, read only
 // but for the answer.
 // To be used with the GIL held.
 class PyOwnEffects : public OwnEffects {
@@ -161,6 +162,7 @@ public:
         velocity_ = seen(signals.velocity);
         angle_ = seen(signals.angle);
         torque_ = seen(signals.torque);
+        command_ = seen(signals.command);
         parameters_.clear();
         for (const OwnEffect& e : effects_) {
             py::list lanes;
@@ -176,12 +178,13 @@ public:
     }
 
     void ask(OwnPlace place, double time) override {
-        const bool chained = place == OwnPlace::actuator || place == OwnPlace::sensor;
-        double* const signal = place == OwnPlace::actuator ? signals_.torque : signals_.velocity;
+        double* const signal = replaced_at(place);
+        const bool chained = signal != nullptr;
         if (!chained) std::fill(answer_, answer_ + width_, 0.0);
         for (std::size_t i = 0; i < effects_.size(); ++i) {
             if (effects_[i].place != place) continue;
-            const RealArray found = RealArray::ensure(effects_[i].function(velocity_, angle_, torque_, time, *parameters_[i]));
+            const py::object answer = effects_[i].function(velocity_, angle_, torque_, command_, time, *parameters_[i]);
+            const RealArray found = RealArray::ensure(answer);
             if (!found || (found.size() != 1 && static_cast<std::size_t>(found.size()) != width_)) {
                 PyErr_Clear();
                 throw std::invalid_argument("own: an effect's function has to give one number per lane");
@@ -196,6 +199,17 @@ public:
     }
 
 private:
+    // The signal that an effect there answers in place of; null where the answers are added up.
+    double* replaced_at(OwnPlace place) const {
+        switch (place) {
+            case OwnPlace::command: return signals_.command;
+            case OwnPlace::actuator: return signals_.torque;
+            case OwnPlace::sensor: return signals_.velocity;
+            case OwnPlace::torque:
+            case OwnPlace::friction: return nullptr;
+        }
+        return nullptr;
+    }
     RealArray seen(double* lanes) const {
         RealArray view(static_cast<py::ssize_t>(width_), lanes, py::none());
         view.attr("setflags")(py::arg("write") = false);
@@ -204,7 +218,7 @@ private:
 
     std::vector<OwnEffect> effects_;
     std::vector<py::tuple> parameters_;
-    RealArray velocity_, angle_, torque_;
+    RealArray velocity_, angle_, torque_, command_;
     OwnSignals signals_{};
     double* answer_ = nullptr;
     std::size_t width_ = 0;

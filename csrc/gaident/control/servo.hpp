@@ -26,9 +26,9 @@ struct Servo : ControllerState<R> {
         this->g = R(c.ki * period * settings.newest);
     }
 
-    // As it stands in steady motion: velocity w under the command r, the torque u.
-    void rest(R r, R w, R u) {
-        integral_ = this->s = fnma(this->kp, fma(R(settings_.command_weight), r, -w), u);
+    // As it stands in steady motion: velocity w under the command r, followed as effects let it pass, the torque u.
+    void rest(R r, R followed, R w, R u) {
+        integral_ = this->s = fnma(this->kp, fma(R(settings_.command_weight), followed, -w), u);
         command_.rest(settings_.command_filters, r);
         velocity_.rest(settings_.velocity_filters, w);
         torque_.rest(settings_.torque_filters, u);

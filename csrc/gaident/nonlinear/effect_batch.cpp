@@ -137,7 +137,7 @@ private:
     }
 
     void effects(std::span<const std::size_t> group, EffectSet set, OwnEffects* own, Write write) {
-        const bool alone = group.size() == 1;
+        const bool alone = group.size() == 1 && own == nullptr;
         const std::size_t width = alone ? 1 : effect_lanes;
         const Planned& first = planned_[group[0]];
         std::vector<double> constants(effect_constants * width);
@@ -186,14 +186,14 @@ private:
         run.velocity = velocity.data();
         run.torque = out_.torque == nullptr ? nullptr : torque.data();
         run.angle = out_.angle == nullptr ? nullptr : angle.data();
-        std::vector<double> asked(own == nullptr ? 0 : 4 * width);
+        std::vector<double> asked(own == nullptr ? 0 : 5 * width, no_command);
         if (own != nullptr) {
             std::vector<std::size_t> models(width);
             for (std::size_t lane = 0; lane < width; ++lane) models[lane] = group[std::min(lane, group.size() - 1)];
             run.own = own;
-            run.own_signals = {asked.data(), &asked[width], &asked[2 * width]};
-            run.own_answer = &asked[3 * width];
-            own->begin(models, run.own_signals, &asked[3 * width]);
+            run.own_signals = {asked.data(), &asked[width], &asked[2 * width], &asked[3 * width]};
+            run.own_answer = &asked[4 * width];
+            own->begin(models, run.own_signals, &asked[4 * width]);
         }
         (alone ? job_.kernel->alone : job_.kernel->run)(run, constants.data());
         spread(group, velocity, out_.velocity, width, write);

@@ -4,7 +4,7 @@
 // The loop names no effect: it runs over the list (effects/list.hpp) at each hook (effects/effect.hpp).
 // The chain, with a user's own effects (own_effects.hpp) at those marked with a star:
 //
-//     command -> controller -> *actuator -> actuator_dynamics -> *torque -> coupling, *friction -> *sensor -> sensor_dynamics -> reading
+//     *command -> controller -> *actuator -> actuator_dynamics -> *torque -> coupling, *friction -> *sensor -> sensor_dynamics -> reading
 //
 // One sample is `substeps` steps of h.
 // In the sampled and the open loop the torque is held over the sample; in the continuous one the controller acts every substep
@@ -43,7 +43,11 @@ public:
         dry_ = run.effects.meets(effects_with(dry_hooks)) || own_.friction();
         turning_ = run.effects.meets(effects_that_turn()) || own_.there();
         looking_back_ = run.effects.meets(effects_with(Hooks::tabulate));
-        const Beginning<R> start{plant_.velocity(), c_.before, first_command()};
+        shaping_ = run.effects.meets(effects_with(Hooks::command)) || own_.command();
+        held_ = c_.before;
+        const R given = first_command(), w = plant_.velocity();
+        const R followed = own_.command() ? own_.followed(run, given, w, R(run.start_angle), held_, 0.0) : given;
+        const Beginning<R> start{w, c_.before, followed};
         Effects::each([&]<class E>() __attribute__((always_inline)) {
             if (!run_.effects.has<E>()) return;
             const auto& c = c_.effects.template of<E>();
@@ -53,7 +57,7 @@ public:
         });
         if constexpr (Plant::both_ends) begin_at_load();
         if constexpr (!is_servo) pi_.s = c_.stored;
-        else if (run.moving) pi_.rest(start.command, start.velocity, c_.stored);
+        else if (run.moving) pi_.rest(given, followed, w, c_.stored);
         angle_ = R(run.start_angle);
         theta_middle_ = fma(plant_.velocity(), R(0.5 * h_), angle_);
         if (looking_back_)
@@ -240,6 +244,12 @@ private:
 
     // The velocity command as the effects let it pass.
     [[gnu::always_inline]] R shaped(R r) {
+        if constexpr (OwnInLoop<R>::asks) {  // one question where neither the user's own effects nor others shape it
+            if (!shaping_) [[likely]]
+                return r;
+            if (own_.command()) [[unlikely]]
+                r = own_.followed(run_, r, plant_.velocity(), theta_, held_, time_);
+        }
         return Effects::chain(r, [&]<class E>(R x) __attribute__((always_inline)) {
             if constexpr (hook::command<E>)
                 if (run_.effects.has<E>()) return E::command(c_.effects.template of<E>(), states_.template of<E>(), x);
@@ -276,7 +286,7 @@ private:
     Plant plant_;
     Control pi_;
     double h_, time_ = 0.0;
-    bool dry_, turning_, looking_back_;
+    bool dry_, turning_, looking_back_, shaping_;
     OwnInLoop<R> own_;
     typename Effects::States<R> states_{};  // all zero
     FrictionLaw<R> law_;

@@ -91,11 +91,15 @@ template <class R>
 
 // User-defined effects in the loop.
 // Few models have them: what asks them is apart and called with values, so that the loop's own state may stay in registers.
+// The loop of one candidate asks none: a single model with such effects runs in lanes, where the call costs the same.
 template <class R>
 class OwnInLoop {
 public:
+    static constexpr bool asks = Pack<R>::width > 1;
+
     OwnInLoop(const EffectRun& run, R w)
         : run_(run),
+          command_(at(OwnPlace::command)),
           torque_(at(OwnPlace::torque)),
           friction_(at(OwnPlace::friction)),
           actuator_(at(OwnPlace::actuator)),
@@ -103,11 +107,12 @@ public:
           shaft_(torque_ || friction_),
           w_before_(w) {}
 
-    bool there() const { return run_.own != nullptr; }
-    bool shaft() const { return shaft_; }
-    bool friction() const { return friction_; }
-    bool actuator() const { return actuator_; }
-    bool sensor() const { return sensor_; }
+    bool there() const { return asks && run_.own != nullptr; }
+    bool command() const { return asks && command_; }
+    bool shaft() const { return asks && shaft_; }
+    bool friction() const { return asks && friction_; }
+    bool actuator() const { return asks && actuator_; }
+    bool sensor() const { return asks && sensor_; }
 
     [[gnu::noinline]] static R asked(const EffectRun& run, OwnPlace place, R w, R theta, R u, double t) {
         Pack<R>::store(w, run.own_signals.velocity);
@@ -115,6 +120,14 @@ public:
         Pack<R>::store(u, run.own_signals.torque);
         run.own->ask(place, t);
         return Pack<R>::load(run.own_answer);
+    }
+
+    // The velocity command r as those there let it pass; where others are asked the command is not known.
+    [[gnu::noinline]] static R followed(const EffectRun& run, R r, R w, R theta, R u, double t) {
+        Pack<R>::store(r, run.own_signals.command);
+        r = asked(run, OwnPlace::command, w, theta, u, t);
+        Pack<R>::store(R(no_command), run.own_signals.command);
+        return r;
     }
 
     // The torque with that of the effects at the shaft, evaluated at the predicted mean velocity.
@@ -128,10 +141,10 @@ public:
     R level() const { return level_; }
 
 private:
-    bool at(OwnPlace place) const { return run_.own != nullptr && run_.own->at(place); }
+    bool at(OwnPlace place) const { return there() && run_.own->at(place); }
 
     const EffectRun& run_;
-    bool torque_, friction_, actuator_, sensor_, shaft_;
+    bool command_, torque_, friction_, actuator_, sensor_, shaft_;
     R w_before_, level_ = R(0.0);
 };
 

@@ -3,11 +3,13 @@
 #pragma once
 
 #include <cstddef>
+#include <limits>
 #include <span>
 
 namespace gaident {
 
 enum class OwnPlace {
+    command,   // the velocity command that the controller follows in place of the one given, rad/s
     torque,    // added to the motor's torque at the shaft, N m
     friction,  // dry friction against the motion, its level >= 0, N m
     actuator,  // the torque that acts in place of the one commanded, N m
@@ -19,8 +21,11 @@ struct OwnSignals {
     double* velocity;   // rad/s: at the shaft that in the middle of the substep, foreseen
     double* angle;      // rad
     double* torque;     // N m: at the shaft what saturation, dead band, delay and lag left of the command
+    double* command;    // rad/s: at the command the one given, elsewhere no_command
     double time = 0.0;  // s since the record's start
 };
+
+inline constexpr double no_command = std::numeric_limits<double>::quiet_NaN();
 
 class OwnEffects {
 public:
@@ -29,7 +34,7 @@ public:
     virtual bool at(OwnPlace place) const = 0;
     // A run begins: lane i belongs to model models[i]. `answer`: where the answers go.
     virtual void begin(std::span<const std::size_t> models, const OwnSignals& signals, double* answer) = 0;
-    // Sum over the effects there; at actuator and sensor each takes what the one before it gave.
+    // Sum over the effects there; at command, actuator and sensor each takes what the one before it gave.
     virtual void ask(OwnPlace place, double time) = 0;
 };
 

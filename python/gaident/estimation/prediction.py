@@ -76,7 +76,7 @@ class Predictor(Protocol):
 
 @dataclass(frozen=True)
 class OpenLoop:
-    """The torque drives the model."""
+    """The torque drives the model; with an effect in the controller that no replay contains, the command does."""
 
     data: DataSet
     own_angle: bool = False
@@ -86,6 +86,8 @@ class OpenLoop:
     def velocities(self, parameters: Parameterisation, X: Matrix) -> Matrix:
         """See `Predictor`."""
         inside = [t for t in parameters.terms if t.in_controller]
+        if not all(t.replayable for t in inside):
+            return ClosedLoop(self.data, self.own_angle).velocities(parameters, X)
         if inside:
             return self._replayed(parameters, X, inside)
         return self._under(parameters, X, self.data.free if self.own_angle else self.data.driven)

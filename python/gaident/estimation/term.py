@@ -119,6 +119,11 @@ class Term:
     @property
     def in_controller(self) -> bool:
         """Whether it changes what the controller makes of command and velocity."""
+        return self.place == "controller"
+
+    @property
+    def replayable(self) -> bool:
+        """Whether a replay of the controller contains it; a user-defined effect there acts in the simulated loop alone."""
         return self.limiting is not None
 
     @property

@@ -88,6 +88,7 @@ def register(
     parameters: Sequence[Parameter],
     *,
     meaning: str,
+    command: Function | None = None,
     torque: Function | None = None,
     friction: Function | None = None,
     actuator: Function | None = None,
@@ -96,10 +97,13 @@ def register(
 ) -> Row:
     """Add a user-defined effect to the table, for this Python session.
 
-    Exactly one of the four functions says what it does.
+    Exactly one of the five functions says what it does.
     Each takes (signals, one keyword per parameter), see `Signals`; arguments and answer are arrays, an entry per drive simulated
     side by side.
     It is called at every (sub)step, may be asked about anything that a search tries, and keeps nothing from call to call.
+    No function of yours can be a dynamic actuator or sensor, a friction with a memory or a coupling of two masses: a search asks
+    about many models side by side, in any order and with repeated samples, so that a function has no state, and a coupling's law
+    needs its derivative within the implicit solution of the step.
     A torque is stable where it changes with the velocity by less than the drive's inertia J over a substep h allows:
     abs(d torque/d velocity) < J/h.
 
@@ -113,6 +117,10 @@ def register(
         With the neutral values the effect has to do nothing.
     meaning : str
         One line for tables and reports.
+    command : callable, optional
+        The velocity command that the controller follows [rad/s] in place of signals.command, behind its filters and before the
+        limit of its slope.
+        Where the torque drives the model no controller is simulated, and it does nothing.
     torque : callable, optional
         What is added to the motor's torque [N m]; a brake is negative for positive velocity.
     friction : callable, optional
@@ -151,7 +159,7 @@ def register(
     (Effect('fan', {'coefficient': 1e-06}),)
     >>> ga.effects.unregister("fan")
     """
-    given = {"torque": torque, "friction": friction, "actuator": actuator, "sensor": sensor}
+    given = {"command": command, "torque": torque, "friction": friction, "actuator": actuator, "sensor": sensor}
     chosen = {acts: function for acts, function in given.items() if function is not None}
     if len(chosen) != 1:
         raise ModelError(f"{name} is given {' and '.join(chosen) or 'no function'}: give exactly one of {', '.join(given)}")

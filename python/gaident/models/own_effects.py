@@ -1,18 +1,19 @@
 """User-defined effects: a Python function of the loop's signals, with parameters and units, called by the core at its place.
 
+    controller command    r' = command(s)                    the velocity command that is followed in place of the one given
     shaft      torque     T + torque(s)                      added to the motor's torque
                friction   abs(friction torque) <= level(s)   dry friction, which stops the motor and holds it
     actuator              u' = actuator(s)                   the torque that acts in place of the one commanded
     sensor                w' = sensor(s)                     the velocity that is seen in place of the true one
 
 Asked once per substep at the shaft (with the velocity in the middle of the substep, so that the answer is of second order), once
-per sample at the actuator; `register` says what a function has to be like.
+per sample at command and actuator; `register` says what a function has to be like.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -27,8 +28,11 @@ __all__ = ["OWN", "PLACES", "Function", "Own", "Parameter", "Signals", "checked"
 Signal = NDArray[np.float64]
 Function = Callable[..., Any]
 
-PLACES = {"torque": "shaft", "friction": "shaft", "actuator": "actuator", "sensor": "sensor"}
+PLACES = {"command": "controller", "torque": "shaft", "friction": "shaft", "actuator": "actuator", "sensor": "sensor"}
 """Keyword of `register` -> place in the table."""
+
+REPLACED = {"command": "command", "actuator": "torque", "sensor": "velocity"}
+"""Keyword -> the signal that an effect there answers in place of; what another answers is added up."""
 
 
 class Signals(NamedTuple):
@@ -42,9 +46,12 @@ class Signals(NamedTuple):
         Angle of the motor [rad].
     torque : ndarray, shape (m,)
         Torque [N m]. At the shaft: what saturation, dead band, delay and lag left of the command. At the actuator: the command.
-        At the sensor: the torque that is held over the sample.
+        At command and sensor: the torque that is held until then.
     time : float
         Time since the record's start [s].
+    command : ndarray, shape (m,)
+        At the command: the velocity command as the controller is given it, under a position controller as that one gives it
+        [rad/s]. Elsewhere nan.
 
     See Also
     --------
@@ -55,6 +62,7 @@ class Signals(NamedTuple):
     angle: Signal
     torque: Signal
     time: float
+    command: Signal
 
 
 class Parameter(NamedTuple):
@@ -121,12 +129,11 @@ class Own:
     parameters: tuple[Parameter, ...]
     meaning: str
 
-    def ask(self, velocity: Signal, angle: Signal, torque: Signal, time: float, *values: Signal) -> Any:
+    def ask(self, velocity: Signal, angle: Signal, torque: Signal, command: Signal, time: float, *values: Signal) -> Any:
         """As the core asks; what goes wrong in the function is told with the effect's name."""
+        signals = Signals(velocity, angle, torque, time, command)
         try:
-            return self.function(
-                Signals(velocity, angle, torque, time), **{p.name: v for p, v in zip(self.parameters, values, strict=True)}
-            )
+            return self.function(signals, **{p.name: v for p, v in zip(self.parameters, values, strict=True)})
         except Exception as reason:
             raise ModelError(
                 f"the effect {self.name!r}: its function raised {type(reason).__name__}: {reason}; it is given arrays, so that "
@@ -202,15 +209,19 @@ def _check_function(own: Own) -> None:
     """Asks the function about 24 states of a drive: answers in shape, in range, one by one the same, nothing where neutral."""
     rng = np.random.default_rng(0)
     n = 24
-    w, theta, u = (scale * rng.standard_normal(n) for scale in (30.0, 3.0, 0.5))
-    w[0], u[1] = 0.0, 0.0
+    w, theta, u, r = (scale * rng.standard_normal(n) for scale in (30.0, 3.0, 0.5, 30.0))
+    w[0], u[1], r[2] = 0.0, 0.0, 0.0
+    if own.acts != "command":
+        r = np.full(n, np.nan)
+    signals = {"velocity": w, "angle": theta, "torque": u, "command": r}
     middle = [np.full(n, starts(p)[len(starts(p)) // 2]) for p in own.parameters]
     with np.errstate(all="ignore"):
-        answer = _answer(own, w, theta, u, middle)
-        alone = [_answer(own, w[i : i + 1], theta[i : i + 1], u[i : i + 1], [v[:1] for v in middle])[0] for i in range(n)]
+        answer = _answer(own, signals, middle)
+        each = ({name: s[i : i + 1] for name, s in signals.items()} for i in range(n))
+        alone = [_answer(own, one, [v[:1] for v in middle])[0] for one in each]
         still = [np.full(n, v[0] if math.isnan(p.neutral) else p.neutral) for p, v in zip(own.parameters, middle, strict=True)]
-        nothing = _answer(own, w, theta, u, still)
-    if not np.allclose(answer, alone, rtol=1e-9, atol=0.0):
+        nothing = _answer(own, signals, still)
+    if not np.allclose(answer, alone, rtol=1e-9, atol=0.0, equal_nan=True):
         raise ModelError(
             f"{own.acts} of {own.name} answers otherwise for one drive than for several side by side, or at the second time: its "
             "arguments are arrays, of which each entry stands for itself, and it may keep nothing from call to call"
@@ -218,23 +229,24 @@ def _check_function(own: Own) -> None:
     if not np.all(np.isfinite(answer)):
         at = int(np.flatnonzero(~np.isfinite(answer))[0])
         raise ModelError(
-            f"{own.acts} of {own.name} gives {answer[at]} at velocity {w[at]:g}, angle {theta[at]:g}, torque {u[at]:g}: give a "
-            "function that is finite everywhere"
+            f"{own.acts} of {own.name} gives {answer[at]} at {', '.join(f'{name} {s[at]:g}' for name, s in signals.items())}: "
+            "give a function that is finite everywhere; only a command= knows signals.command, which is nan elsewhere"
         )
     if own.acts == "friction" and np.any(answer < 0.0):
         raise ModelError(f"friction of {own.name} gives {answer.min():g}: it is the size of a torque against the motion, >= 0")
-    identity = {"actuator": u, "sensor": w}.get(own.acts, np.zeros(n))
+    replaced = REPLACED.get(own.acts)
+    identity = np.zeros(n) if replaced is None else signals[replaced]
     if not np.array_equal(nothing, identity):
         values = ", ".join(f"{p.name} {v[0]:g}" for p, v in zip(own.parameters, still, strict=True))
-        wanted = {"actuator": "signals.torque", "sensor": "signals.velocity"}.get(own.acts, "0")
+        wanted = "0" if replaced is None else f"signals.{replaced}"
         raise ModelError(f"{own.acts} of {own.name} is not {wanted} where its parameters are neutral ({values}): correct either")
 
 
-def _answer(own: Own, w: Signal, theta: Signal, u: Signal, values: Sequence[Signal]) -> Signal:
-    views = [a.copy() for a in (w, theta, u, *values)]
+def _answer(own: Own, signals: Mapping[str, Signal], values: Sequence[Signal]) -> Signal:
+    w, theta, u, r, *given = views = [a.copy() for a in (*signals.values(), *values)]
     for view in views:
         view.setflags(write=False)
-    found = own.ask(views[0], views[1], views[2], 0.25, *views[3:])
+    found = own.ask(w, theta, u, r, 0.25, *given)
     try:
         answer = np.asarray(found, dtype=np.float64)
     except (TypeError, ValueError):

@@ -224,7 +224,64 @@ private:
     double* answer_ = nullptr;
 };
 
+// A share of the velocity command, per model.
+class Share : public OwnEffects {
+public:
+    std::vector<double> share;
+
+    bool at(OwnPlace place) const override { return place == OwnPlace::command; }
+    void begin(std::span<const std::size_t> models, const OwnSignals& signals, double* answer) override {
+        models_.assign(models.begin(), models.end());
+        command_ = signals.command;
+        answer_ = answer;
+    }
+    void ask(OwnPlace place, double time) override {
+        CHECK(place == OwnPlace::command);
+        CHECK(time >= 0.0);
+        for (std::size_t lane = 0; lane < models_.size(); ++lane) answer_[lane] = share[models_[lane]] * command_[lane];
+    }
+
+private:
+    std::vector<std::size_t> models_;
+    double* command_ = nullptr;
+    double* answer_ = nullptr;
+};
+
 }  // namespace
+
+TEST_CASE("a command that the core does not know: as the input changed beforehand, none in the open loop") {
+    const std::size_t count = 9;  // more than the lanes
+    const double no_torque = 0.0;
+    for (const LoopKind kind : {LoopKind::open, LoopKind::sampled}) {
+        const std::vector<double> input = input_of(300, kind);
+        EffectJob job = job_of(input, kind);
+        job.substeps = 4;
+        Share own;
+        std::vector<EffectModel> models(count);
+        for (std::size_t i = 0; i < count; ++i) {
+            own.share.push_back(0.25 * static_cast<double>(i));
+            models[i].linear = one_mass();
+            models[i].add(effect<CoulombFriction>, &no_torque);
+        }
+        job.own = &own;
+        std::vector<double> found(count * input.size());
+        simulate_effects(job, models, {}, {found.data(), nullptr, nullptr});
+        for (std::size_t i = 0; i < count; ++i) {
+            std::vector<double> changed = input, expected(input.size());
+            for (double& r : changed) r *= kind == LoopKind::open ? 1.0 : own.share[i];
+            EffectJob plain = job_of(changed, kind);
+            plain.substeps = 4;
+            simulate_effects(plain, std::span(models).subspan(i, 1), {}, {expected.data(), nullptr, nullptr});
+            double top = 0.0, off = 0.0;
+            for (std::size_t k = 0; k < input.size(); ++k) {
+                top = std::max(top, std::abs(expected[k]));
+                off = std::max(off, std::abs(found[i * input.size() + k] - expected[k]));
+            }
+            CHECK(i == 0 || top > 0.1);
+            CHECK(off <= 1e-12 * (1.0 + top));
+        }
+    }
+}
 
 TEST_CASE("effects that the core does not know: as its own, in lanes as alone") {
     const std::size_t count = 11;  // more than the lanes

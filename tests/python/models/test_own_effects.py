@@ -87,6 +87,110 @@ def test_a_built_in_effect_written_again_is_the_same(
     np.testing.assert_allclose(mine.position, theirs.position, rtol=0.0, atol=tolerance * np.abs(theirs.position).max())
 
 
+def dead_zone(s: effects.Signals, width: np.ndarray) -> np.ndarray:
+    return s.command - np.clip(s.command, -width, width)
+
+
+def share_of(s: effects.Signals, share: np.ndarray) -> np.ndarray:
+    return share * s.command
+
+
+def registered_commands() -> None:
+    width = parameter("width", "rad/s", highest=30.0)
+    effects.register("dead_zone", [width], meaning="a dead zone of the command", command=dead_zone)
+    share = parameter("share", "1", neutral=1.0, highest=2.0)
+    effects.register("share", [share], meaning="a share of the command", command=share_of)
+
+
+CLOSED = {
+    **{name: loop for name, loop in LOOPS.items() if loop is not None},
+    "cascade": ga.Cascade(CONTROLLER, 0.25 * DT, torque_filters=[ga.LowPass(1e-3)]),
+    "limited": ga.PI(0.02, 0.6, torque_limit=0.4),
+}
+
+
+@pytest.mark.parametrize("name", CLOSED)
+def test_a_command_is_as_the_record_with_the_command_changed_beforehand(name: str) -> None:
+    registered_commands()
+    assert next(row for row in effects.table() if row.name == "dead_zone").place == "controller"
+    loop, rec = CLOSED[name], record(CONTROLLER)
+    # In the continuous loop what effects change, simulated in substeps, is added to the linear response, which is not.
+    exact = 1e-3 if name == "continuous" else 1e-11
+    nothing = ONE.with_effect("coulomb_friction", torque=0.0)
+    cases: list[tuple[str, dict[str, float], np.ndarray]] = [("share", {"share": 0.7}, 0.7 * COMMAND)]
+    if name != "continuous":  # which draws the command as a line between the samples
+        cases.append(("dead_zone", {"width": 8.0}, COMMAND - np.clip(COMMAND, -8.0, 8.0)))
+    for effect, values, command in cases:
+        found = ga.run(ONE.with_effect(effect, **values), rec, loop, substeps=4)
+        expected = ga.run(nothing, rec.with_channels(command=command), loop, substeps=4)
+        for signal in ("velocity", "torque"):
+            changed, as_before = getattr(found, signal), getattr(expected, signal)
+            np.testing.assert_allclose(changed, as_before, rtol=0.0, atol=exact * np.abs(as_before).max())
+        assert np.abs(found.velocity - ga.simulate(ONE, rec, loop)).max() > 1.0
+    if name != "continuous":
+        moving = [14.0, 0.05]  # rad/s, N m
+        found = ga.run(ONE.with_effect("share", share=0.7), rec, loop, moving, substeps=4)
+        expected = ga.run(nothing, rec.with_channels(command=0.7 * COMMAND), loop, moving, substeps=4)
+        np.testing.assert_allclose(found.velocity, expected.velocity, rtol=0.0, atol=exact * np.abs(expected.velocity).max())
+    both = ONE.with_effect("share", share=0.7).with_effect("command_rate_limit", rate=2000.0)
+    slow = ga.run(ONE.with_effect("command_rate_limit", rate=2000.0), rec.with_channels(command=0.7 * COMMAND), loop, substeps=4)
+    found = ga.run(both, rec, loop, substeps=4)
+    np.testing.assert_allclose(found.velocity, slow.velocity, rtol=0.0, atol=exact * np.abs(slow.velocity).max())
+
+
+def test_a_command_acts_behind_a_position_controller_and_not_where_the_torque_drives_the_model() -> None:
+    registered_commands()
+    path = 0.4 * (1.0 - np.cos(np.linspace(0.0, 12.0, N)))
+    rec = ga.Record(DT, position_command=path, velocity=np.zeros(N))
+    given, softer = (ga.Cascade(CONTROLLER, position=ga.P(gain)) for gain in (40.0, 30.0))
+    found = ga.run(ONE.with_effect("share", share=0.75), rec, given, substeps=4)
+    expected = ga.run(ONE.with_effect("coulomb_friction", torque=0.0), rec, softer, substeps=4)
+    np.testing.assert_allclose(found.velocity, expected.velocity, rtol=0.0, atol=1e-11 * np.abs(expected.velocity).max())
+    assert np.abs(found.velocity - ga.simulate(ONE, rec, given)).max() > 0.05
+    driven = record(None)
+    for name, values in (("share", {"share": 0.5}), ("command_rate_limit", {"rate": 10.0})):
+        alone = ga.simulate(ONE.with_effect("coulomb_friction", torque=0.0), driven, substeps=4)
+        np.testing.assert_allclose(ga.simulate(ONE.with_effect(name, **values), driven, substeps=4), alone, rtol=0.0, atol=1e-9)
+
+
+def test_a_command_sees_the_signals_of_its_sample() -> None:
+    seen: list[tuple[float, float, float, float, float]] = []
+
+    def look(s: effects.Signals, size: np.ndarray) -> np.ndarray:
+        seen.append((s.time, float(s.command[0]), float(s.velocity[0]), float(s.angle[0]), float(s.torque[0])))
+        return s.command + 0.0 * size
+
+    effects.register("look", [parameter(unit="rad/s")], meaning="looks only", command=look)
+    seen.clear()
+    rec = record(CONTROLLER)
+    run = ga.run(ONE.with_effect("look", size=0.5), rec, CONTROLLER, substeps=4)
+    assert seen.pop(0) == (0.0, 0.0, 0.0, 0.0, 0.0)  # the command before the record
+    time, command, velocity, angle, torque = np.array(seen).T
+    np.testing.assert_allclose(time, rec.time, rtol=0.0, atol=1e-12)
+    np.testing.assert_array_equal(command, COMMAND)
+    np.testing.assert_allclose(velocity, run.velocity, rtol=0.0, atol=1e-12)
+    np.testing.assert_allclose(angle, run.position, rtol=0.0, atol=1e-12)
+    np.testing.assert_allclose(torque, np.append(0.0, run.torque[:-1]), rtol=0.0, atol=1e-12)
+
+
+def test_a_diagnosis_finds_a_command_where_no_torque_is_logged_and_says_where_it_does_not_look() -> None:
+    registered_commands()
+    command = COMMAND + 3.0 * np.sin(0.3 * np.arange(N))
+    driven = ga.Record(DT, command=command, velocity=np.zeros(N))
+    made = ga.run(ONE.with_effect("dead_zone", width=4.0), driven, CONTROLLER)
+    velocity = made.velocity + 0.1 * np.random.default_rng(1).standard_normal(N)
+    (finding,) = ga.diagnose(ga.Record(DT, command=command, velocity=velocity), CONTROLLER).causes
+    width = finding.parameters["width"]
+    assert (finding.effect, finding.place) == ("dead_zone", "controller")
+    assert abs(width.value - 4.0) < 4.0 * width.std < 0.2
+    logged = ga.Record(DT, command=command, velocity=velocity, torque=made.torque)
+    assert "replay asks no function of your own" in str(ga.diagnose(logged, CONTROLLER).not_testable["dead_zone"])
+    assert "no controller is simulated" in str(ga.diagnose(logged).not_testable["dead_zone"])
+    plain = ga.run(ONE, driven, CONTROLLER)
+    follows = ga.Record(DT, command=command, velocity=plain.velocity, torque=plain.torque)
+    assert "follows from command and velocity without it" in str(ga.diagnose(follows, CONTROLLER).not_testable["dead_zone"])
+
+
 def test_a_spring_is_the_exact_linear_system() -> None:
     registered_spring()
     k, J, D = 0.05, 3e-4, 0.004
@@ -182,7 +286,7 @@ def test_bounds_are_kept_and_exports_refuse() -> None:
 REFUSED: list[tuple[str, dict[str, Any]]] = [
     ("built-in", {"name": "cogging"}),
     ("name is 'my effect'", {"name": "my effect"}),
-    ("exactly one of torque, friction, actuator, sensor", {"torque": None}),
+    ("exactly one of command, torque, friction, actuator, sensor", {"torque": None}),
     ("torque and sensor", {"sensor": spring}),
     ("give a function", {"torque": 3.0}),
     ("meaning of mine", {"meaning": ""}),
@@ -204,6 +308,8 @@ REFUSED: list[tuple[str, dict[str, Any]]] = [
     ("raised ValueError.*read-only", {"torque": lambda s, size: np.multiply(s.velocity, size, out=s.velocity)}),
     ("finite everywhere", {"torque": lambda s, size: size / s.velocity}),
     ("is not 0 where its parameters are neutral", {"torque": lambda s, size: size + 1.0}),
+    ("is not signals.command where", {"torque": None, "command": lambda s, size: size * s.command}),
+    ("only a command= knows signals.command", {"torque": lambda s, size: size * s.command}),
     ("is not signals.torque where", {"torque": None, "actuator": lambda s, size: size * s.torque}),
     ("against the motion, >= 0", {"torque": None, "friction": lambda s, size: size * s.velocity}),
 ]  # fmt: skip

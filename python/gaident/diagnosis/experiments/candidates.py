@@ -54,5 +54,18 @@ def candidates(
         if not data.loop_follows:
             still = say("the logged {torque} does not follow from this controller, so that no loop is simulated")
         why |= dict.fromkeys(inside, still)
-    out = {*why, *at.decided, *decided_by_the_angle(clean), *(inside if outside else ())}
+    not_replayed = [name for name in inside if not LIBRARY[name].replayable]
+    if not_replayed and (reason := _not_in_loop(data, at)) is not None:
+        why = dict.fromkeys(not_replayed, reason) | why
+    replayed = [name for name in inside if LIBRARY[name].replayable]
+    out = {*why, *at.decided, *decided_by_the_angle(clean), *(replayed if outside else ())}
     return [t for t in LIBRARY.values() if t.name not in out], why
+
+
+def _not_in_loop(data: DataSet, at: AtController) -> Text | None:
+    """Why a user-defined effect in the controller, which acts in the simulated loop alone, is no candidate; None where it is."""
+    if at.decided and at.follows:
+        return say("the logged {torque} follows from command and velocity without it")
+    if at.decided:
+        return say("the logged {torque} tells what the controller did, and its replay asks no function of your own")
+    return None if data.fits_in_loop else Text("it acts in the simulated loop alone, and no loop is simulated here")

@@ -35,8 +35,8 @@ LIBRARY = Library({row.name: row for place in PLACES for row in place.CAUSES})
 
 
 def in_controller() -> tuple[Cause, ...]:
-    """Effects at the controller."""
-    return tuple(t for t in LIBRARY.values() if t.in_controller)
+    """Effects at the controller that a replay of it decides: the built-in ones."""
+    return tuple(t for t in LIBRARY.values() if t.replayable)
 
 
 def not_testable(motions: Motions) -> dict[str, Text]:

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from gaident.diagnosis.library.cause import Cause
 from gaident.diagnosis.library.sides import at_load, at_motor, name_of
+from gaident.diagnosis.library.triggers import in_a_loop
 from gaident.models.effects import Row, table
 from gaident.models.own_effects import starts
 from gaident.policy.table import POLICY
@@ -89,4 +90,5 @@ def _term(row: Row) -> Cause:
         lambda scales: list(limits),
         lambda scales: list(rows),
         lambda scales: steps,
+        needs=(in_a_loop,) if row.place == "controller" else (),
     )
