@@ -55,9 +55,6 @@ LIKELY = {
 """The likely reason of each contradiction, in words."""
 
 
-DIVERGED = 1e3  # no decision: of the torque's rms; a model that needs so much more has diverged, as a free run has
-
-
 @dataclass(frozen=True)
 class Check:
     """The second method's answer: what it found, its force error [N m], the comparison, before and after with their force errors.
@@ -127,7 +124,7 @@ def _forces(
             error = filtered.force_error(model, torques)
         except GaidentError:
             return None
-        return (error, [e for e, _ in torques]) if error.rms <= DIVERGED * error.torque_rms else None
+        return (error, [e for e, _ in torques]) if error.rms <= POLICY.diverged * error.torque_rms else None
 
     def fitness(plain: Fitness, found: tuple[ForceError, list[Vector]] | None) -> Fitness:
         if found is None:

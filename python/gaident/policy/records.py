@@ -16,6 +16,9 @@ class Records:
     least_samples: int = record(
         100, "samples", "length of a record at least: below, noise filter and linear model use up what it knows", SHORT
     )
+    diverged: float = record(
+        1e3, "1", "of the measured rms or largest value: a simulation that is further off has diverged and is no figure", DRIVES
+    )
     one_course: float = record(0.9, "1", "correlation of command and velocity, from which one follows the other", SUCCESS)
     same_unit: float = record(3.0, "1", "factor between the two then, up to which they have the same unit", SUCCESS)
     near_rpm: float = record(1.25, "1", "factor within which their ratio is that of rpm to rad/s: one of them is in rpm", SUCCESS)

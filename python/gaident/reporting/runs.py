@@ -22,6 +22,7 @@ from gaident.estimation.dataset import DataSet
 from gaident.models.drive_torque import torque_of
 from gaident.models.model import Model
 from gaident.models.simulate import run
+from gaident.policy.table import POLICY
 from gaident.results.diagnosis import Diagnosis
 from gaident.results.identification import Identification
 from gaident.show.report.views import RecordView
@@ -88,7 +89,7 @@ def run_of(result: Diagnosis | Identification, rec: Record) -> RecordView:
 
 def _finite(velocity: Vector, rec: Record, what: str, notes: list[str]) -> Vector:
     """Values beyond what a picture can show are left out: a diverging simulation ends in a gap."""
-    limit = 1e3 * float(np.abs(rec.velocity).max() or 1.0)  # no decision: what a chart still shows of a simulation that diverges
+    limit = POLICY.diverged * float(np.abs(rec.velocity).max() or 1.0)
     with np.errstate(invalid="ignore"):
         away = ~(np.abs(velocity) <= limit)
     if not np.any(away):

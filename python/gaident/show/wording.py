@@ -6,6 +6,7 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 
 from gaident.axis import identifier_words, unit, word
+from gaident.policy.table import POLICY
 from gaident.results.diagnosis import Diagnosis
 from gaident.results.estimate import Estimate
 from gaident.results.finding import Finding, where
@@ -37,8 +38,8 @@ def number(value: float, digits: int = 4) -> str:  # no decision: how a number i
 
 
 def free_run_words(run: Fitness, written: Callable[[float], str] = number) -> tuple[str, str]:
-    """(rmse, fit in percent) of a free run; a run whose error is a thousand times the motion diverges, and has no figures."""
-    if run.fit_percent < -1e5:  # no decision: how a number is printed
+    """(rmse, fit in percent) of a free run; one whose error is `diverged` times the motion has diverged: no figures."""
+    if run.fit_percent < 100.0 * (1.0 - POLICY.diverged):  # no decision: in percent
         return "diverges", ""
     return written(run.rmse), f"{run.fit_percent:.2f}"
 

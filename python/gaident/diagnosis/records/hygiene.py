@@ -19,7 +19,6 @@ Vector = NDArray[np.float64]
 ROBUST = 1.4826  # no decision: median absolute deviation of normal noise -> standard deviation
 SECOND = 1.5  # no decision: sqrt(14/6), noise of the line through two samples before over that through the two next ones
 SHORTEST = 7  # no decision: the fewest samples of which all of these differences can be taken at all
-DIVERGED = 1e6  # no decision: of the velocity; a simulation that leaves so much has diverged
 PASSES = 4  # no decision: neighbours hide each other, no more than four in a row; passes end where none is new
 
 
@@ -27,7 +26,7 @@ def left_out(rec: Record, model: Model, controller: PI | None) -> NDArray[np.int
     """Samples that stand out of the velocity, or out of the linear model's error: a slope of the velocity may hide them."""
     with np.errstate(over="ignore", invalid="ignore"):
         error = rec.velocity - simulate(model, rec, controller)
-    if np.all(np.abs(error) < DIVERGED * np.abs(rec.velocity).max()):
+    if np.all(np.abs(error) < POLICY.diverged * np.abs(rec.velocity).max()):
         return outliers(rec.velocity, error)
     return outliers(rec.velocity)
 
