@@ -91,14 +91,7 @@ def autocorrelation(e: Vector, lags: int) -> Vector:
 
 
 def chi2_tail(x: float, dof: int) -> float:
-    """P(chi2 > x) for a whole number of degrees of freedom (Abramowitz and Stegun, Handbook, 26.4.4 and 26.4.5).
+    """P(chi2 > x) for so many degrees of freedom."""
+    from scipy.special import chdtrc
 
-        even: e^-h sum_(k < dof/2) h^k/k!,   odd: erfc(sqrt h) + e^-h sum_(k < (dof-1)/2) h^(k+1/2)/Gamma(k+3/2),   h = x/2
-
-    SciPy's `chdtrc` is the same; an identification does not wait for its import.
-    """
-    if x <= 0.0:
-        return 1.0
-    half, start = 0.5 * x, 0.5 * (dof % 2)
-    terms = (math.exp((k + start) * math.log(half) - half - math.lgamma(k + start + 1.0)) for k in range(dof // 2))
-    return min(math.fsum(terms) + (math.erfc(math.sqrt(half)) if dof % 2 else 0.0), 1.0)
+    return float(chdtrc(dof, x))

@@ -76,23 +76,20 @@ def least_squares_phi(c: Vector, whitening: Matrix) -> Vector:
 
     Levenberg-Marquardt from the pairwise solution, the parameters scaled to one.
     """
-    phi = phi_by_pairwise(c)
-    size = phi_scales(phi)
-    residual = whitening @ (coefficients_of_phi(phi) - c)
-    damping = 1e-6  # no decision: the start of a solver
-    for _ in range(200):  # no decision: of a solver, which ends by its tolerance
-        J = whitening @ jacobian_of_phi(phi) * size
-        augmented = np.vstack([J, np.diag(np.sqrt(damping) * np.linalg.norm(J, axis=0))])
-        step = np.linalg.lstsq(augmented, -np.concatenate([residual, np.zeros(5)]), rcond=None)[0]
-        longest = np.max(np.abs(step))
-        trial = phi + size * step
-        new_residual = whitening @ (coefficients_of_phi(trial) - c)
-        if new_residual @ new_residual <= residual @ residual:
-            phi, residual, damping = trial, new_residual, 0.1 * damping  # no decision: the step of a solver
-        else:
-            damping *= 10.0
-        if longest < 1e-11 or damping > 1e12:  # no decision: the end of a solver
-            break
+    from scipy.optimize import least_squares
+
+    start = phi_by_pairwise(c)
+    size = phi_scales(start)
+
+    def error(moved: Vector) -> Vector:
+        return whitening @ (coefficients_of_phi(start + size * moved) - c)
+
+    def slope(moved: Vector) -> Matrix:
+        return whitening @ jacobian_of_phi(start + size * moved) * size
+
+    # no decision: the end of a solver
+    found = least_squares(error, np.zeros(5), slope, method="lm", xtol=1e-11, ftol=1e-15, gtol=1e-15)
+    phi: Vector = start + size * np.asarray(found.x)
     return phi
 
 

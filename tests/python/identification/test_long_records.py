@@ -95,6 +95,7 @@ def test_chains_of_masses_are_compared_where_a_long_record_falsifies_the_model()
 MEMORY = """
 import sys
 import numpy as np
+import scipy.optimize, scipy.special  # so that their import does not fill what the first identify() leaves free
 import gaident as ga
 
 def kib(field):
