@@ -20,7 +20,7 @@ from gaident.control.controller import Controller
 from gaident.control.pi import bare_pi
 from gaident.data.record import Record
 from gaident.data.torque_kind import MEASURED
-from gaident.diagnosis.held_parts import IN_SAMPLE, held_parts
+from gaident.diagnosis.held_parts import held_parts
 from gaident.diagnosis.library.terms import LIBRARY
 from gaident.diagnosis.records.hygiene import quantisation
 from gaident.estimation.criterion import effective_samples
@@ -33,7 +33,7 @@ from gaident.models.simulate import initial_state
 from gaident.models.starts import noise_std, starts_moving
 from gaident.models.stored_torque import stored_torque
 from gaident.policy.table import POLICY
-from gaident.results.fitness import Fitness
+from gaident.results.fitness import IN_SAMPLE, Fitness
 
 __all__ = [
     "Gains",
@@ -69,6 +69,11 @@ class Gains:
     harmful: tuple[str, ...] = ()
     closed: bool = False
     notes: tuple[Text, ...] = ()
+
+    @property
+    def in_sample(self) -> bool:
+        """Whether the figures are of the samples that were fitted."""
+        return self.held_out == IN_SAMPLE
 
     def of(self, effect: str) -> float:
         """Fall of the error that one effect brought, as a fraction of the error before it."""

@@ -29,12 +29,12 @@ from gaident.data.record import Record
 from gaident.diagnosis.records.hygiene import quantisation
 from gaident.models.starts import noise_std
 from gaident.policy.table import POLICY
+from gaident.results.fitness import IN_SAMPLE
 
-__all__ = ["IN_SAMPLE", "VALIDATION", "Held", "held_out_from", "held_parts"]
+__all__ = ["VALIDATION", "Held", "held_out_from", "held_parts"]
 
 Vector = NDArray[np.float64]
 
-IN_SAMPLE = "in-sample"
 VALIDATION = "validation records"
 
 

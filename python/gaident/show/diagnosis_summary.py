@@ -179,8 +179,7 @@ def _gain(dia: Diagnosis, axis: str, scales: Scales) -> list[str]:
         shown, size = scales[v]
         sizes = (dia.before.rmse, dia.after.rmse, dia.after.noise_floor)
         rows = [(*row, more) for row, more in zip(rows, (f"rmse [{shown}]", *(number(size * x) for x in sizes)), strict=True)]
-    in_sample = dia.held_out == "in-sample"
-    where = "IN-SAMPLE: too little data, or too little motion, to hold any out" if in_sample else f"on {dia.held_out}"
+    where = "IN-SAMPLE: too little data, or too little motion, to hold any out" if dia.in_sample else f"on {dia.held_out}"
     lines = [f"Free-run simulation, {where}", *table(rows if extended else [rows[0], rows[1], rows[3]])]
     if not dia.loop_follows:
         lines += _wrapped(said(not_the_loop_words(dia), axis), "  ")
@@ -206,7 +205,7 @@ def _force(dia: Diagnosis, axis: str) -> list[str]:
     rows = force_rows(dia, axis)
     if not rows:
         return []
-    where = "IN-SAMPLE" if dia.held_out == "in-sample" else f"on {dia.held_out}"
+    where = "IN-SAMPLE" if dia.in_sample else f"on {dia.held_out}"
     torque = "torque" if axis == "rotary" else "force"
     head = ("", f"rms [{unit('N m', axis)}]", f"of the {torque} [%]")
     return [f"{word('Torque', axis)} error, {where}", *table([head, *rows]), *_wrapped(force_words(dia, axis), "  ")]

@@ -12,9 +12,9 @@ from gaident.axis import Text
 from gaident.diagnosis.check import Check
 from gaident.diagnosis.explain.held_out import standing
 from gaident.diagnosis.gains import Gains, interval_of_fall
-from gaident.diagnosis.held_parts import IN_SAMPLE, held_out_from, held_parts
+from gaident.diagnosis.held_parts import held_out_from, held_parts
 from gaident.diagnosis.linear_part import linear_of_part
-from gaident.results.diagnosis import Fitness
+from gaident.results.fitness import IN_SAMPLE, Fitness
 
 MODEL = ga.OneMass(3e-4, 1e-3).model()
 RNG = np.random.default_rng(1)
@@ -143,7 +143,7 @@ def test_a_fall_of_the_error_at_standstill_is_none_and_is_said() -> None:
     dia = ga.diagnose(rec, validation=still)
     assert dia.held_out.startswith("the last 30 % of the record") and any("hold" in n and "no motion" in n for n in dia.notes)
     dia = ga.diagnose(friction_record(600, 2400))
-    assert dia.held_out == IN_SAMPLE and "too little motion, to hold any out" in dia.summary()
+    assert dia.in_sample and "too little motion, to hold any out" in dia.summary()
 
 
 def friction_record(count: int, still: int) -> ga.Record:

@@ -93,6 +93,7 @@ def fake() -> Any:
         next_experiment=ga.Proposal(np.zeros(2000), DT, ("cogging", "velocity_ripple"), 412.3, "Slow speeds: several turns."),
         gain_interval=(0.55, 0.64),
         held_out="validation records",
+        in_sample=False,
         controller_numbers={},
         relevance=None,
         base_shift={
@@ -181,7 +182,7 @@ def test_a_gain_that_is_none_is_not_called_one() -> None:
     assert "in the velocity." in flat(summary(result)) and "shows it" not in summary(result)
     result.before = Fitness(0.5, 97.0, 0.49)
     assert "it is at the noise with and without" in flat(summary(result))
-    result.held_out = "in-sample"
+    result.in_sample = True
     assert "IN-SAMPLE: too little data, or too little motion, to hold any out" in flat(summary(result))
 
 

@@ -97,7 +97,7 @@ def tiles(dia: Diagnosis, view: View) -> Html:
     """The figures seen first."""
     v = velocity_unit(view.axis)
     _, size = view.scales.get(v, (v, 1.0))
-    where = "in-sample" if dia.held_out == "in-sample" else "held-out data"
+    where = "in-sample" if dia.in_sample else "held-out data"
     shown = [tile(f"error, linear model ({where})", number(size * dia.before.rmse), _unit_of(dia.before.rmse, v, view))]
     if dia.model.effects:
         shown.append(tile(f"error, extended model ({where})", number(size * dia.after.rmse), _unit_of(dia.after.rmse, v, view)))
@@ -159,7 +159,7 @@ def _causes(dia: Diagnosis, view: View) -> Section:
         others = (words(a, axis) for a in f.alternatives)
         name = joined((tag("b", cause_words(f, dia, axis)), *(joined((" or ", tag("b", other))) for other in others)))
         rows: list[Row] = [(n, *map(typeset, cells), remark) for n, *cells, remark in map(_row(view), f.parameters.items())]
-        kind = "in-sample" if dia.held_out == "in-sample" else "held-out"
+        kind = "in-sample" if dia.in_sample else "held-out"
         place = f"Place: {f.place}. " if f.place else ""
         figures = f"{place}{f.delta_bic:.0f} BIC units; the {kind} error falls by {percent(f.gain)} % of what was left before it."
         parts.append(
@@ -235,7 +235,7 @@ def _gain(dia: Diagnosis, view: View, drawn: Charts) -> Section:
         rows.append(("extended model", *_free_run(dia.after)))
     rows.append(("noise of the measured velocity", number(dia.after.noise_floor), ""))
     parts: list[str] = []
-    if dia.held_out == "in-sample":
+    if dia.in_sample:
         text = (
             "In-sample: there were too few data, or too little motion, to hold any out. Parameters were fitted to the same "
             "samples: this flatters them."
