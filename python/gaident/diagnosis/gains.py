@@ -1,8 +1,8 @@
 """Before and after: the free-run simulation, linear and extended, on data that no parameter was fitted to.
 
 With validation records these are used whole.
-Without, parameters are fitted again to the first 70 % of each record and scored on the rest of one continuous run,
-which is not restarted; the linear model is then identified on the same 70 %.
+Without, parameters are fitted again to the first part of each record (`fitted_share`) and scored on the rest of one continuous
+run, which is not restarted; the linear model is then identified on the same first part.
 Where a record is too short for that, or one of its parts holds no motion, the figures are in-sample and say so.
 """
 

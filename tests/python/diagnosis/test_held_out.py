@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -14,6 +16,7 @@ from gaident.diagnosis.explain.held_out import standing
 from gaident.diagnosis.gains import Gains, interval_of_fall
 from gaident.diagnosis.held_parts import held_out_from, held_parts
 from gaident.diagnosis.linear_part import linear_of_part
+from gaident.policy.table import POLICY
 from gaident.results.fitness import IN_SAMPLE, Fitness
 
 MODEL = ga.OneMass(3e-4, 1e-3).model()
@@ -122,6 +125,12 @@ def test_what_is_held_out_holds_motion(count: int, still: int, before: int, at: 
     assert paths[0] == pytest.approx(0.7 * sum(paths), rel=0.03)
     words = held_parts([rec], [], None).words
     assert words.startswith("the last 30 % of the record," if not still + before else "the last 30 % of its path,")
+
+
+def test_words_and_cut_have_the_share_of_the_policy(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("gaident.diagnosis.held_parts.POLICY", replace(POLICY, fitted_share=0.6))
+    held = held_parts([moving(3000)], [], None)
+    assert held.words == "the last 40 % of the record, parameters fitted to the first 60 %" and held.part == (1800,)
 
 
 def test_a_record_for_validation_at_rest_judges_nothing() -> None:
