@@ -186,7 +186,9 @@ def test_init_writes_a_drive_file_that_identify_takes(here: Path, capsys: pytest
     # The line to go on with is one that a shell takes.
     Path("my step.csv").write_bytes(Path("step.csv").read_bytes())
     assert main(["init", "my step.csv", "--out", "my.toml"]) == 0
-    assert "then, once that is done: gaident identify 'my step.csv' --drive my.toml" in capsys.readouterr().out
+    assert "then, once that is done: gaident diagnose 'my step.csv' --drive my.toml" in capsys.readouterr().out
+    head = Path("my.toml").read_text().splitlines()[0]
+    assert "for `gaident diagnose LOG --drive drive.toml`" in head and head.endswith('from "my step.csv".')
     # Every commented key is one that the file may have.
     for line in text.splitlines():
         key = line.removeprefix("# ").split("=")[0].strip()
