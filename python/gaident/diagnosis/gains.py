@@ -55,7 +55,8 @@ class Gains:
 
     harmful: effects without which the extended model is better on the held-out data, beyond chance. scored: records, each with
     the first sample that is held out; mechanism, extended: the models, without and with the effects, fitted to the rest.
-    closed: whether the runs were closed over the controller; the torque drives them else. notes: of records that are left out.
+    closed: whether the runs were closed over the controller; the torque drives them else.
+    notes: of records that are left out, and of a linear model that has seen what is held out.
     """
 
     before: Fitness
@@ -99,7 +100,7 @@ def measured_gains(
     records: Sequence[Record],
     validation: Sequence[Record],
     controller: Controller | None,
-    linear: Callable[[tuple[int, ...] | None], Model],
+    linear: Callable[[tuple[int, ...] | None], tuple[Model, tuple[Text, ...]]],
     final: Fit,
     objective: Objective,
     noise: float | None,
@@ -107,7 +108,7 @@ def measured_gains(
 ) -> Gains:
     """Errors of the linear model, of each stage and of the extended model, closed over the controller where they can be.
 
-    linear: the linear model of the first samples of each record, so many of each; None: of all.
+    linear: the linear model of the first samples of each record, so many of each, and what is said of it; None: of all.
     """
     loop = closed_over(controller, (*records, *validation), final.effects)
     controller = objective.data.older(loop)
@@ -118,7 +119,8 @@ def measured_gains(
     named = list(at_controller.items())
     bare = stages[0].parameters.model(stages[0].x)
     # Not known to the identification: the velocity's age, and what the torque did between the lines of a slower log.
-    chain = [bare if objective.data.slower or objective.data.age else linear(part)]
+    first, told = (bare, ()) if objective.data.slower or objective.data.age else linear(part)
+    chain = [first]
     chain += [with_effects(bare, dict(named[:k])) for k in range(1, len(named) + 1)]
     chain += [with_effects(f.parameters.model(f.x), at_controller) for f in stages[1:]]
     # Where the simulated loop is known not to be the drive's, the torque drives the models that are compared and printed.
@@ -170,7 +172,7 @@ def measured_gains(
         extended=chain[-1],
         closed=closing is not None,
         harmful=tuple(harmful),
-        notes=notes,
+        notes=(*notes, *told),
     )
 
 
