@@ -13,11 +13,12 @@ from gaident.axis import Text, said, say, unit, word
 from gaident.data.formats.units import Constants, factor, needed_constant
 from gaident.data.guess import Guess, guess_channels, unit_from_position, unit_from_velocity
 from gaident.data.listing import Listing
-from gaident.data.timeaxis import SLOW_STEP, stamp_unit
+from gaident.data.timeaxis import SLOW_STEP, even_step, stamp_unit
 from gaident.data.torque_kind import kind_of_torque
 from gaident.drive.draft_lines import head_of, line_of, plain, quoted
 from gaident.drive.log_content import axes_of, gaps_of, with_content
 from gaident.errors import ReadError
+from gaident.policy.table import POLICY
 
 __all__ = ["DriveDraft", "draft"]
 
@@ -200,16 +201,24 @@ class _Draft:
             lines.append(line_of("pieces = true", f"the time has {some}: what lies around them are records of their own"))
             lines.append(line_of(f"# dt = {self.dt:.9g}", "s, between the gaps; needed for gaident experiment"))
         elif self.dt is None:
-            lines.append(
-                self._todo(
-                    "# resample = 1e-3", "resample", f"s; the time stamps are irregular: {plain(time.note if time else '')}"
-                )
-            )
+            lines.append(self._todo(*self._resampling(), f"the time stamps are irregular: {plain(time.note if time else '')}"))
         else:
             source = f"from the column {quoted(time.name)}" if time is not None else "as the file states"
             lines.append(line_of(f"# dt = {self.dt:.9g}", f"s, {source}; needed for logs without it, and for gaident experiment"))
         lines.append(line_of("# decimate = 10", "keep every tenth sample behind a low-pass, for very long logs"))
         return lines
+
+    def _resampling(self) -> tuple[str, str, str]:
+        """The line that puts irregular stamps on an even axis, its key, and which values are allowed."""
+        time = self.guess.time
+        stamps = self.values.get(time.name) if time is not None else None
+        steps = np.diff(stamps) * self._second() if stamps is not None else np.zeros(0)
+        usual = float(np.median(steps)) if len(steps) else 0.0
+        if not usual > 0.0:
+            return "# resample = 1e-3", "resample", "s from line to line of an even time axis, a number above 0"
+        least, most = usual / POLICY.resample_finer, usual * POLICY.resample_coarser
+        allowed = f"s from line to line of an even time axis, from {least:.3g} to {most:.3g}"
+        return f"# resample = {even_step(steps)[0]:.6g}", "resample", allowed
 
     def time(self) -> list[str]:
         """The column of the time."""
@@ -357,7 +366,8 @@ class _Draft:
         digits = 2 - math.floor(math.log10(max(found)))
         return float(math.ceil(max(found) * 10.0**digits) / 10.0**digits)
 
-    def _todo(self, line: str, what: str, comment: str) -> str:
+    def _todo(self, line: str, what: str, *comments: str) -> str:
+        comment = "; ".join(comments)
         self.fill.append(f"{what}: {comment}")
         return line_of(line, f"FILL IN: {comment}")
 

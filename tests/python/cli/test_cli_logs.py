@@ -289,6 +289,29 @@ def test_log_options_of_drive_file_and_command_line(here: Path, capsys: pytest.C
     assert "--resample 0.001" in capsys.readouterr().err
 
 
+def test_init_says_which_steps_an_even_axis_may_have(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    stamps = np.cumsum(np.where(np.arange(400) % 2, 10, 12))
+    lines = (f"{t},{np.sin(1e-3 * t)},{np.cos(1e-3 * t)}" for t in stamps)
+    Path("jitter.csv").write_text("\n".join(["time [ms],velocity [rad/s],torque [Nm]", *lines]))
+    assert main(["init", "jitter.csv", "--out", "jitter.toml"]) == 0
+    said = "resample: s from line to line of an even time axis, from 0.0001 to 0.015; the time stamps are irregular: "
+    assert said in capsys.readouterr().out
+    text = Path("jitter.toml").read_text()
+    assert "\n# resample = 0.011        # FILL IN: s from line to line of an even time axis, from 0.0001 to 0.015;" in text
+    from gaident.cli import COMMANDS
+    from gaident.cli.drive import drive_of
+    from gaident.cli.options import parser_of
+
+    for step, allowed in ((0.011, True), (0.015, True), (0.016, False), (0.00009, False)):
+        Path("even.toml").write_text(text.replace("# resample = 0.011 ", f"resample = {step} "))
+        asked = drive_of(parser_of(COMMANDS).parse_args(["identify", "jitter.csv", "--drive", "even.toml", "--loop", "open"]))
+        if allowed:
+            assert asked.read("jitter.csv").dt == step
+        else:
+            with pytest.raises(ga.GaidentError, match="resample"):
+                asked.read("jitter.csv")
+
+
 def test_experiment_writes_the_command_of_a_first_record(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
     Path("d.toml").write_text("dt = 1e-3\n[limits]\nspeed = 100\ntorque = 2\nduration = 2\n")
     assert main(["experiment", "--drive", "d.toml", "--out", "first.csv"]) == 0
