@@ -16,14 +16,17 @@ from gaident.show.relevance_words import bent_of, part_words, relevance_words, r
 from gaident.show.second_method import comparison_rows, force_rows, force_words, method_words
 from gaident.show.units import Scales, beside, scales_of
 from gaident.show.wording import (
+    SPREAD,
     WIDTH,
     cause_words,
     certainty,
     controller_lines,
+    diverges,
     either,
     free_run_words,
     missing_words,
     number,
+    step_words,
     table,
     with_std,
     words,
@@ -185,7 +188,7 @@ def _gain(dia: Diagnosis, axis: str, scales: Scales) -> list[str]:
         lines += _wrapped(said(not_the_loop_words(dia), axis), "  ")
     if extended and dia.before.rmse > 0.0:
         lines += _wrapped(said(fall_words(dia), axis), "  ")
-        steps = [f"{cause_words(f, dia, axis)} {100.0 * f.gain:.0f} %" for f in dia.findings if not f.is_noise]
+        steps = [f"{cause_words(f, dia, axis)} {step_words(f.gain)}" for f in dia.findings if not f.is_noise]
         if len(steps) > 1:
             lines += _wrapped(f"One after the other, each of what was left before it: {', '.join(steps)}.", "  ")
     return lines
@@ -222,6 +225,11 @@ def _second_method(dia: Diagnosis, axis: str) -> list[str]:
 
 def fall_words(dia: Diagnosis) -> str:
     """By how much the error falls, in words."""
+    if diverges(dia.after):
+        linear = "so does the linear one" if diverges(dia.before) else "the linear one does not"
+        return Text(f"In free run the extended model diverges, {linear}.")
+    if diverges(dia.before):
+        return Text("In free run the linear model diverges, the extended one does not.")
     fall = 100.0 * (1.0 - dia.after.rmse / dia.before.rmse)  # no decision: percent
     low, high = (100.0 * x for x in dia.gain_interval)
     if fall < -1.0:
@@ -243,9 +251,18 @@ def fall_words(dia: Diagnosis) -> str:
 def _growth_words(dia: Diagnosis, growth: float) -> Text:
     """Why the error of the velocity grows, by so many percent, and what the names rest on then."""
     if not dia.loop_follows:
-        return say("The error of the velocity grows by {:.0f} %: the simulated controller is not the drive's.", growth)
+        text = (
+            "In free run the extended model is worse than the linear one (the error of the velocity grows by {:.0f} %): the "
+            "simulated controller is not the drive's."
+        )
+        return say(text, growth)
     varies = "beyond" if dia.gain_interval[1] < 0.0 else "within"
-    grows = say("The error of the velocity grows by {:.0f} %, {} its variation over the record", growth, varies)
+    grows = say(
+        "In free run the extended model is worse than the linear one: the error of the velocity grows by {:.0f} %, {} its "
+        "variation over the record",
+        growth,
+        varies,
+    )
     before, after = dia.before.force_error, dia.after.force_error
     if after is not None and (before is None or after < before):
         was = "diverges without the effects" if before is None else f"was {number(before)}"
@@ -272,6 +289,8 @@ def _mechanics(dia: Diagnosis, axis: str) -> list[str]:
         u = "" if e.unit == "1" else unit(e.unit, axis)
         rows.append((mechanical_name(name, axis), with_std(e.value, e.std), u, remark_words(dia, name, e)))
     lines = [head, *table(rows)]
+    if any(e.std is not None and e.std > 0.0 for e in dia.mechanics.values()):
+        lines.append(f"  +- {SPREAD}")
     if "resonance" not in dia.mechanics and len(dia.model.poles) > 1:
         lines.append("  a second pair of poles that does not swing: no resonance of a shaft")
     return lines
@@ -297,7 +316,11 @@ def moved_words(old: float, new: float, std: float | None) -> str:
     """By how much a parameter moved; empty where it was 0 within its deviation, for no share of that means anything."""
     if not math.isfinite(old) or abs(old) <= POLICY.below_zero * (std or 0.0):
         return ""
-    return f"{round(100.0 * (new / old - 1.0), 1) + 0.0:+.1f} %" if old * new > 0.0 else "other sign"
+    if old * new <= 0.0:
+        return "other sign"
+    if new / old >= 10.0:  # no decision: how a number is printed
+        return f"{number(new / old, 3)} times as large"
+    return f"{round(100.0 * (new / old - 1.0), 1) + 0.0:+.1f} %"
 
 
 def _record(dia: Diagnosis, axis: str) -> list[str]:

@@ -21,6 +21,7 @@ from gaident.diagnosis.explain.wording import evidence_of
 from gaident.errors import GaidentError, RecordError, SettingsError
 from gaident.results.diagnosis import Comparison, Fitness
 from gaident.results.finding import Finding
+from gaident.show.report.diagnosis import headline
 from gaident.show.wording import certainty
 from places import GOLDEN
 
@@ -193,11 +194,69 @@ def test_a_mechanism_that_diverges_along_the_motion_has_no_force_error() -> None
     assert "mechanism without effects diverges" in flat(summary(result))
 
 
+def test_a_free_run_that_diverges_has_no_percentage() -> None:
+    result = fake()
+    result.after = Fitness(1e150, -1e155, 0.1)
+    assert "In free run the extended model diverges, the linear one does not." in flat(summary(result))
+    result.before = Fitness(1e150, -1e155, 0.1)
+    assert "In free run the extended model diverges, so does the linear one." in flat(summary(result))
+    result.after = fake().after
+    assert "In free run the linear model diverges, the extended one does not." in flat(summary(result))
+
+
+@pytest.mark.parametrize(
+    ("gain", "words"),
+    [
+        (0.834, "83 %"),
+        (-0.002, "0 %"),
+        (-0.53, "nothing (the free run is worse: its error grows by 53 %)"),
+        (-4e187, "nothing (the free run diverges)"),
+    ],
+)
+def test_what_a_step_removes_is_said_in_words(gain: float, words: str) -> None:
+    result = fake()
+    noise, friction, ripple = result.findings
+    result.findings = (noise, replace(friction, gain=gain), ripple)
+    assert f"of what was left before it: coulomb friction {words}, cogging 20 %." in flat(summary(result))
+
+
+def test_a_parameter_that_moved_by_more_than_ten_times_says_how_many() -> None:
+    result = fake()
+    result.base_shift = {"inertia": (6.88e-4 / 15.7, 6.88e-4)}
+    assert "15.7 times as large" in summary(result)
+
+
+@pytest.mark.parametrize(
+    ("effect", "parameters", "words"),
+    [
+        ("integration_rule", {}, "The integration rule of the controller is not given; with it nothing significant is left."),
+        (
+            "other_gains",
+            {"kp": ga.Estimate(0.52, 1e-4, "N m s/rad"), "ki": ga.Estimate(20.7, 0.1, "N m/rad")},
+            "The controller has other gains than the given ones (kp 0.52 N m s/rad, ki 20.7 N m/rad); with it nothing",
+        ),
+    ],
+)
+def test_what_differs_in_the_controller_is_no_lack_of_the_model(
+    effect: str, parameters: dict[str, ga.Estimate], words: str
+) -> None:
+    result = fake()
+    result.verdict = "explained"
+    of_controller = Finding(effect, parameters, place="controller")
+    result.findings = (of_controller,)
+    assert headline(result, "rotary").startswith(words)
+    result.findings = (of_controller, fake().findings[1])
+    assert headline(result, "rotary").startswith("The model lacks coulomb friction (0.0412 N m); the ")
+    if parameters:
+        assert "kp 0.52 N s/m, ki 20.7 N/m" in headline(result, "linear")
+
+
 def test_an_error_that_grows_is_said_to_and_not_to_be_compared() -> None:
     result = fake()
     result.after = Fitness(1.5, 80.0, 0.1)
     text = flat(summary(result))
-    assert "grows by 200 %, within its variation over the record: the effects were found on" in text and "hardly" not in text
+    assert "In free run the extended model is worse than the linear one: the error of the velocity grows by 200 %, within" in text
+    assert "within its variation over the record: the effects were found on" in text and "hardly" not in text
     assert "closed over this controller" in text
     result.controller = None
     text = flat(summary(result))
@@ -211,7 +270,7 @@ def test_an_error_that_grows_is_said_to_and_not_to_be_compared() -> None:
     assert "falls (diverges without the effects, is 0.0123 N m)" in flat(summary(result))
     result.loop_follows = False
     text = flat(summary(result))
-    assert "grows by 200 %: the simulated controller is not the drive's." in text
+    assert "worse than the linear one (the error of the velocity grows by 200 %): the simulated controller is not the" in text
     assert "(see above): the logged torque drives these models, no loop is closed." in text
     result.torque_logged = False
     text = flat(summary(result))
