@@ -42,6 +42,7 @@ __all__ = [
     "mechanical_name",
     "moved_words",
     "next_words",
+    "noise_words",
     "parameter_row",
     "verdict_words",
 ]
@@ -184,6 +185,8 @@ def _gain(dia: Diagnosis, axis: str, scales: Scales) -> list[str]:
         rows = [(*row, more) for row, more in zip(rows, (f"rmse [{shown}]", *(number(size * x) for x in sizes)), strict=True)]
     where = "IN-SAMPLE: too little data, or too little motion, to hold any out" if dia.in_sample else f"on {dia.held_out}"
     lines = [f"Free-run simulation, {where}", *table(rows if extended else [rows[0], rows[1], rows[3]])]
+    if noise := noise_words(dia):
+        lines += _wrapped(said(noise, axis), "  ")
     if not dia.loop_follows:
         lines += _wrapped(said(not_the_loop_words(dia), axis), "  ")
     if extended and dia.before.rmse > 0.0:
@@ -192,6 +195,20 @@ def _gain(dia: Diagnosis, axis: str, scales: Scales) -> list[str]:
         if len(steps) > 1:
             lines += _wrapped(f"One after the other, each of what was left before it: {', '.join(steps)}.", "  ")
     return lines
+
+
+def noise_words(dia: Diagnosis) -> Text:
+    """What an encoder's steps make of the noise, where a free run leaves less than what was estimated; empty elsewhere."""
+    found = (f.parameters["step"] for f in dia.findings if f.is_noise and "step" in f.parameters)
+    step = next((e.value for e in found if e.unit == "rad/s"), None)
+    if step is None or dia.noise is not None or not dia.after.rmse < dia.after.noise_floor:
+        return Text("")
+    text = (
+        "The free run leaves less than this noise, which is estimated from third differences as if it were white. Steps of {} "
+        "{rad/s} make {} {rad/s} rms where the velocity itself is rounded, and {} {rad/s} where it is the difference of two "
+        "rounded {angles}: that noise is not white."
+    )
+    return say(text, number(step), number(step / math.sqrt(12.0), 3), number(step / math.sqrt(6.0), 3))
 
 
 def not_the_loop_words(dia: Diagnosis) -> Text:

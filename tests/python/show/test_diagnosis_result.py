@@ -194,6 +194,22 @@ def test_a_mechanism_that_diverges_along_the_motion_has_no_force_error() -> None
     assert "mechanism without effects diverges" in flat(summary(result))
 
 
+def test_what_an_encoder_makes_of_the_noise_is_said_where_the_free_run_leaves_less() -> None:
+    """A difference of two rounding errors, each even over a step q, has the deviation q/sqrt(6)."""
+    result = fake()
+    steps = Finding("velocity_quantisation", {"step": ga.Estimate(0.024, 0.0, "rad/s")}, is_noise=True)
+    result.findings, result.noise = (steps, *result.findings), None
+    assert "third differences" not in summary(result)
+    result.after = replace(result.after, rmse=0.0097, noise_floor=0.016)
+    text = flat(summary(result))
+    assert "Steps of 0.024 rad/s make 0.00693 rad/s rms where the velocity itself is rounded, and 0.0098 rad/s where" in text
+    assert "the difference of two rounded positions" in flat(summary(result, "linear"))
+    e = np.random.default_rng(0).uniform(-0.5, 0.5, 100_000)
+    assert 0.024 * np.diff(e).std() == pytest.approx(0.0098, rel=0.01)
+    result.noise = 0.016
+    assert "third differences" not in summary(result)
+
+
 def test_a_free_run_that_diverges_has_no_percentage() -> None:
     result = fake()
     result.after = Fitness(1e150, -1e155, 0.1)

@@ -22,6 +22,7 @@ from gaident.show.diagnosis_summary import (
     mechanical_name,
     moved_words,
     next_words,
+    noise_words,
     not_the_loop_words,
     parameter_row,
 )
@@ -260,6 +261,8 @@ def _gain(dia: Diagnosis, view: View, drawn: Charts) -> Section:
     else:
         parts.append(tag("p", "Free-run simulation on ", dia.held_out, "."))
     parts.append(table(("", f"rmse [{v}]", "fit [%]"), [rows]))
+    if noise := noise_words(dia):
+        parts.append(tag("p", typeset(said(noise, axis))))
     if not dia.loop_follows:
         parts.append(box(tag("p", typeset(said(not_the_loop_words(dia), axis))), kind="warn"))
     if extended and dia.before.rmse > 0.0:
