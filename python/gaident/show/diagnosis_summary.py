@@ -16,6 +16,7 @@ from gaident.show.relevance_words import bent_of, part_words, relevance_words, r
 from gaident.show.second_method import comparison_rows, force_rows, force_words, method_words
 from gaident.show.units import Scales, beside, scales_of
 from gaident.show.wording import (
+    NOT_AS_GIVEN,
     SPREAD,
     WIDTH,
     cause_words,
@@ -25,6 +26,7 @@ from gaident.show.wording import (
     either,
     free_run_words,
     missing_words,
+    not_as_given,
     number,
     step_words,
     table,
@@ -122,10 +124,12 @@ def verdict_words(dia: Diagnosis, axis: str) -> str:
     if dia.verdict == "unexplained":
         return "The model is wrong, and no effect of the library fits what is left."
     causes = [f for f in dia.findings if not f.is_noise]
-    named = list(dict.fromkeys(cause_words(f, dia, axis) for f in causes if not f.alternatives))
+    given = [f for f in causes if not f.alternatives and f.effect in NOT_AS_GIVEN]
+    named = list(dict.fromkeys(cause_words(f, dia, axis) for f in causes if not f.alternatives and f not in given))
     kinds = dict.fromkeys(filter(None, (missing_words(f, dia, axis) for f in causes if f.alternatives)))
     open_ = dict.fromkeys(either(f, dia, axis) for f in causes if f.alternatives and not missing_words(f, dia, axis))
     parts = [f"{'Cause' if len(named) == 1 else 'Causes'}: {', '.join(named)}."] if named else []
+    parts += [f"{Text(not_as_given(f, axis)).begun()}." for f in given]
     parts += [f"{text[0].upper()}{text[1:]}." for text in kinds]
     parts += [
         f"What is {'also ' if named else ''}missing is one of: {names}. These data do not tell them apart." for names in open_
@@ -134,7 +138,7 @@ def verdict_words(dia: Diagnosis, axis: str) -> str:
         return " ".join(["Part of what the model gets wrong is explained; something significant is left.", *parts])
     if open_:
         return " ".join(["The model was wrong.", *parts, "With that nothing significant is left."])
-    found = "the cause is found, and with it" if len(named) == 1 else "the causes are found, and with them"
+    found = "the cause is found, and with it" if len(named) + len(given) == 1 else "the causes are found, and with them"
     return " ".join([f"The model was wrong, {found} nothing significant is left.", *parts])
 
 

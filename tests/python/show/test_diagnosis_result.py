@@ -261,6 +261,8 @@ def test_what_differs_in_the_controller_is_no_lack_of_the_model(
     of_controller = Finding(effect, parameters, place="controller")
     result.findings = (of_controller,)
     assert headline(result, "rotary").startswith(words)
+    found = "The model was wrong, the cause is found, and with it nothing significant is left."
+    assert flat(summary(result)).startswith(f"Verdict: explained {found} {words.partition(';')[0]}. ")
     result.findings = (of_controller, fake().findings[1])
     assert headline(result, "rotary").startswith("The model lacks coulomb friction (0.0412 N m); the ")
     if parameters:
