@@ -30,6 +30,7 @@ __all__ = [
     "linear_sentences",
     "message_of",
     "order",
+    "percent",
     "period_of",
     "restored",
     "said",
@@ -212,6 +213,11 @@ def turns(travel: float, digits: int = 2) -> Text:
 def order(per_turn: float) -> Text:
     """An order [1/turn]; on a linear axis in 1/m."""
     return Text(f"{per_turn:g}", f"{per_turn / TURN:.2g} 1/m")
+
+
+def percent(share: float) -> str:
+    """A share [1] in whole percent: "70 %"."""
+    return f"{100.0 * share:.0f} %"
 
 
 def linear_sentences(texts: Iterable[str]) -> dict[str, str]:

@@ -8,11 +8,13 @@ import re
 from collections.abc import Mapping, Sequence
 from typing import Any, NoReturn
 
+from gaident.axis import percent
 from gaident.cli.export_options import EXPORT_EXAMPLES, EXPORT_HELP, add_export_options
 from gaident.cli.log_options import add_log_commands, add_log_options, gain, number
 from gaident.cli.report_options import REPORT_EXAMPLES, REPORT_HELP, add_report_option, add_report_options
 from gaident.control.words import LOOPS
 from gaident.errors import SettingsError
+from gaident.policy.table import POLICY
 from gaident.results.settings import INITIAL_STATES
 
 __all__ = ["PICTURES", "parser_of"]
@@ -158,9 +160,8 @@ def parser_of(commands: Mapping[str, str]) -> argparse.ArgumentParser:
         "diagnose", "LOG... ", "log -> what the model gets wrong, its cause, the gain", DIAGNOSE_HELP, DIAGNOSE_EXAMPLES
     )
     sub.add_argument("logs", nargs="+", metavar="LOG", help="log file; several are judged together")
-    sub.add_argument(
-        "--validation", nargs="+", metavar="LOG", help="logs that no parameter is fitted to (default: the last 30 %% of each log)"
-    )
+    end = f"the last {percent(1.0 - POLICY.fitted_share)}% of each log"  # argparse prints %% as %
+    sub.add_argument("--validation", nargs="+", metavar="LOG", help=f"logs that no parameter is fitted to (default: {end})")
     sub.add_argument("--model", metavar="FILE", help="the identification to diagnose, as identify --out saved it")
     add_log_options(sub)
     _add_controller_options(sub)

@@ -42,28 +42,35 @@ MEASURED_WORDS = frozenset(
 )
 """It is of the motor, and what happened rather than what was asked for."""
 
+
+def _points(names: str, related: str, letters: str) -> dict[str, int]:
+    """Word -> points; names of the quantity, of what comes with it, and of a letter or two."""
+    listed = ((names, POLICY.name_points), (related, POLICY.related_points), (letters, POLICY.letter_points))
+    return {word: points for words, points in listed for word in words.split()}
+
+
 QUANTITY_WORDS: dict[str, dict[str, int]] = {
-    "velocity": {
-        **dict.fromkeys(("velocity", "velocities", "vel", "velo", "speed", "spd", "omega", "drehzahl", "geschwindigkeit"), 4),
-        **dict.fromkeys(("winkelgeschwindigkeit", "rpm", "vitesse", "velocità", "velocita", "velocidad", "sokudo"), 4),
-        **dict.fromkeys(("jissokudo", "kaitensuu", "kaitensu", "vcmd", "vfb", "fvel", "rvel"), 4),
-        **dict.fromkeys(("w", "wm", "n", "v", "vl", "dq", "qd"), 2),
-    },
-    "torque": {
-        **dict.fromkeys(("torque", "trq", "moment", "momenten", "drehmoment", "tau", "force", "kraft", "effort"), 4),
-        **dict.fromkeys(("couple", "coppia", "toruku", "tcmd"), 4),
-        **dict.fromkeys(("current", "strom", "iq", "isq", "thrust", "icmd", "courant", "corrente", "corriente"), 3),
-        **dict.fromkeys(("denryuu", "denryu"), 3),
-        **dict.fromkeys(("u", "m", "i", "il", "par", "f"), 2),
-    },
-    "position": {
-        **dict.fromkeys(("position", "pos", "angle", "theta", "phi", "lage", "winkel", "posizione", "posición", "quota"), 4),
-        **dict.fromkeys(("ichi", "pcmd", "pfb", "fpos", "rpos"), 4),
-        **dict.fromkeys(("encoder", "codeur"), 3),
-        **dict.fromkeys(("q", "qm", "enc", "weg", "x", "s", "pl"), 2),
-    },
+    "velocity": _points(
+        "velocity velocities vel velo speed spd omega drehzahl geschwindigkeit winkelgeschwindigkeit rpm vitesse velocità "
+        "velocita velocidad sokudo jissokudo kaitensuu kaitensu vcmd vfb fvel rvel",
+        "",
+        "w wm n v vl dq qd",
+    ),
+    "torque": _points(
+        "torque trq moment momenten drehmoment tau force kraft effort couple coppia toruku tcmd",
+        "current strom iq isq thrust icmd courant corrente corriente denryuu denryu",
+        "u m i il par f",
+    ),
+    "position": _points(
+        "position pos angle theta phi lage winkel posizione posición quota ichi pcmd pfb fpos rpos",
+        "encoder codeur",
+        "q qm enc weg x s pl",
+    ),
 }
-"""How much each speaks for a quantity; f, a letter of many meanings, only beside a word for a command or a measurement."""
+"""How many points each speaks for a quantity by: its name, what comes with it, a letter or two.
+
+f, a letter of many meanings, speaks only beside a word for a command or a measurement.
+"""
 
 FOREIGN_WORDS = frozenset(
     (

@@ -11,7 +11,7 @@ from gaident.data.formats.time_names import TIME_NAMES
 from gaident.errors import ReadError
 from gaident.policy.table import POLICY
 
-__all__ = ["SLOW_STEP", "TimeAxis", "stamp_unit", "time_column"]
+__all__ = ["SLOW_STEP", "TimeAxis", "even_step", "stamp_unit", "time_column"]
 
 SLOW_STEP = 0.5  # no decision: what is asked and said; s, longer steps of a column without a unit may be milliseconds
 
@@ -84,11 +84,11 @@ class TimeAxis:
                 1.0 + 1e-9
             )
             if irregular.any():
-                _refuse(table, self.column, t, int(np.argmax(irregular)), usual * self.second, shift)
+                _refuse(table, self.column, t, int(np.argmax(irregular)), self.second, shift)
             if rounding.max() > POLICY.coarse_stamps * usual:
                 # Where the digits suit the sample time, nearly all steps are equal and the few others are real.
                 if unequal.mean() < POLICY.few_unequal:
-                    _refuse(table, self.column, t, int(np.argmax(unequal)), usual * self.second, shift)
+                    _refuse(table, self.column, t, int(np.argmax(unequal)), self.second, shift)
                 _too_coarse(table, self.column, float(rounding.max()))
         self.step = usual
 
@@ -159,19 +159,39 @@ def _too_coarse(table: LogTable, column: Column, printed: float) -> None:
     )
 
 
-def _refuse(table: LogTable, column: Column, t: NDArray[np.float64], step: int, dt: float, shift: int) -> None:
-    usual = float(np.median(np.diff(t)))
-    bridged = t[step + 1] - t[step] <= POLICY.pause * usual
-    even = (
-        f"cut the log there, or put it on an even axis with {arg('resample', format(dt, '.6g'))}"
-        if bridged
-        else f"split the log there into two records, as read_pieces does ({arg('pieces', python='pieces=True')})"
-    )
+def even_step(steps: NDArray[np.float64]) -> tuple[float, bool]:
+    """(how far samples are apart if they are even and only their stamps are not, whether many steps differ).
+
+    steps: from stamp to stamp (n,).
+    Where few steps differ from the usual one, samples are lost, and the others are a usual step apart.
+    Where many do, the stamps jitter, and the samples are apart by the mean: stamps that alternate between steps of 10 and 12 ms
+    are those of samples every 11 ms, and neither is the median.
+    The mean has no more digits than n steps show; what goes back and what is a pause does not count.
+    """
+    usual = float(np.median(steps))
+    near = steps[(steps > 0.0) & (steps <= POLICY.pause * usual)]
+    if not len(near) or float(np.mean(np.abs(near - usual) > POLICY.clock_jitter * usual)) < POLICY.few_unequal:
+        return usual, False
+    mean, doubt = float(near.mean()), float(np.ptp(near)) / len(near)
+    written = (float(f"{mean:.{digits}g}") for digits in range(1, _DIGITS))
+    return next((x for x in written if abs(x - mean) <= doubt), mean), True
+
+
+def _refuse(table: LogTable, column: Column, t: NDArray[np.float64], step: int, second: float, shift: int) -> None:
+    steps = np.diff(t)
+    usual = float(np.median(steps))
+    apart, jitters = even_step(steps)
+    dt = format(apart * second, ".6g")
+    if t[step + 1] - t[step] > POLICY.pause * usual:
+        even = f"split the log there into two records, as read_pieces does ({arg('pieces', python='pieces=True')})"
+    else:
+        even = f"{'' if jitters else 'cut the log there, or '}put it on an even axis with {arg('resample', dt)}"
+    others = f"its steps are {apart:.6g} on average" if jitters else f"elsewhere by {usual:.6g}"
     raise ReadError.at(
         f"{table.path}, {table.place(step + 1 - shift)}",
         f"time column {column.key!r} is irregular: from {t[step]:.12g} to {t[step + 1]:.12g} it jumps by "
-        f"{t[step + 1] - t[step]:.6g}, elsewhere by {usual:.6g}",
-        f"{even}; if the samples are in truth evenly spaced, give {arg('dt', format(dt, '.6g'))} and set {NO_TIME}",
+        f"{t[step + 1] - t[step]:.6g}, {others}",
+        f"{even}; if the samples are in truth evenly spaced, give {arg('dt', dt)} and set {NO_TIME}",
     )
 
 

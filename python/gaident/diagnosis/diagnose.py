@@ -68,7 +68,7 @@ def diagnose(
     identification : Identification, optional
         What `identify` found; None: it is run first.
     validation : Record or sequence of Record, optional
-        Records that no fit sees; None: the last 30 % of each long record are held out, see `Diagnosis.held_out`.
+        Records that no fit sees; None: the end of each long record is held out, see `Diagnosis.held_out`.
     noise : float or Record, optional
         Standard deviation of the velocity noise [rad/s], or a Record at standstill; None: from the record itself.
     bootstrap : int

@@ -1,8 +1,8 @@
 """Before and after: the free-run simulation, linear and extended, on data that no parameter was fitted to.
 
 With validation records these are used whole.
-Without, parameters are fitted again to the first 70 % of each record and scored on the rest of one continuous run,
-which is not restarted; the linear model is then identified on the same 70 %.
+Without, parameters are fitted again to the first part of each record (`fitted_share`) and scored on the rest of one continuous
+run, which is not restarted; the linear model is then identified on the same first part.
 Where a record is too short for that, or one of its parts holds no motion, the figures are in-sample and say so.
 """
 
@@ -20,7 +20,7 @@ from gaident.control.controller import Controller
 from gaident.control.pi import bare_pi
 from gaident.data.record import Record
 from gaident.data.torque_kind import MEASURED
-from gaident.diagnosis.held_parts import IN_SAMPLE, held_parts
+from gaident.diagnosis.held_parts import held_parts
 from gaident.diagnosis.library.terms import LIBRARY
 from gaident.diagnosis.records.hygiene import quantisation
 from gaident.estimation.criterion import effective_samples
@@ -33,7 +33,7 @@ from gaident.models.simulate import initial_state
 from gaident.models.starts import noise_std, starts_moving
 from gaident.models.stored_torque import stored_torque
 from gaident.policy.table import POLICY
-from gaident.results.fitness import Fitness
+from gaident.results.fitness import IN_SAMPLE, Fitness
 
 __all__ = [
     "Gains",
@@ -55,7 +55,8 @@ class Gains:
 
     harmful: effects without which the extended model is better on the held-out data, beyond chance. scored: records, each with
     the first sample that is held out; mechanism, extended: the models, without and with the effects, fitted to the rest.
-    closed: whether the runs were closed over the controller; the torque drives them else. notes: of records that are left out.
+    closed: whether the runs were closed over the controller; the torque drives them else.
+    notes: of records that are left out, and of a linear model that has seen what is held out.
     """
 
     before: Fitness
@@ -69,6 +70,11 @@ class Gains:
     harmful: tuple[str, ...] = ()
     closed: bool = False
     notes: tuple[Text, ...] = ()
+
+    @property
+    def in_sample(self) -> bool:
+        """Whether the figures are of the samples that were fitted."""
+        return self.held_out == IN_SAMPLE
 
     def of(self, effect: str) -> float:
         """Fall of the error that one effect brought, as a fraction of the error before it."""
@@ -94,7 +100,7 @@ def measured_gains(
     records: Sequence[Record],
     validation: Sequence[Record],
     controller: Controller | None,
-    linear: Callable[[tuple[int, ...] | None], Model],
+    linear: Callable[[tuple[int, ...] | None], tuple[Model, tuple[Text, ...]]],
     final: Fit,
     objective: Objective,
     noise: float | None,
@@ -102,7 +108,7 @@ def measured_gains(
 ) -> Gains:
     """Errors of the linear model, of each stage and of the extended model, closed over the controller where they can be.
 
-    linear: the linear model of the first samples of each record, so many of each; None: of all.
+    linear: the linear model of the first samples of each record, so many of each, and what is said of it; None: of all.
     """
     loop = closed_over(controller, (*records, *validation), final.effects)
     controller = objective.data.older(loop)
@@ -113,7 +119,8 @@ def measured_gains(
     named = list(at_controller.items())
     bare = stages[0].parameters.model(stages[0].x)
     # Not known to the identification: the velocity's age, and what the torque did between the lines of a slower log.
-    chain = [bare if objective.data.slower or objective.data.age else linear(part)]
+    first, told = (bare, ()) if objective.data.slower or objective.data.age else linear(part)
+    chain = [first]
     chain += [with_effects(bare, dict(named[:k])) for k in range(1, len(named) + 1)]
     chain += [with_effects(f.parameters.model(f.x), at_controller) for f in stages[1:]]
     # Where the simulated loop is known not to be the drive's, the torque drives the models that are compared and printed.
@@ -165,7 +172,7 @@ def measured_gains(
         extended=chain[-1],
         closed=closing is not None,
         harmful=tuple(harmful),
-        notes=notes,
+        notes=(*notes, *told),
     )
 
 

@@ -24,17 +24,17 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from gaident.axis import Text, joined, say
+from gaident.axis import Text, joined, percent, say
 from gaident.data.record import Record
 from gaident.diagnosis.records.hygiene import quantisation
 from gaident.models.starts import noise_std
 from gaident.policy.table import POLICY
+from gaident.results.fitness import IN_SAMPLE
 
-__all__ = ["IN_SAMPLE", "VALIDATION", "Held", "held_out_from", "held_parts"]
+__all__ = ["VALIDATION", "Held", "held_out_from", "held_parts"]
 
 Vector = NDArray[np.float64]
 
-IN_SAMPLE = "in-sample"
 VALIDATION = "validation records"
 
 
@@ -63,12 +63,14 @@ def held_parts(records: Sequence[Record], validation: Sequence[Record], noise: f
         return Held([(r, 0) for r in records], IN_SAMPLE, None, notes)
     scored = [(r, at) for r, at in zip(records, cuts, strict=True) if at is not None]
     by_time = all(at == int(POLICY.fitted_share * len(r)) for r, at in scored)
-    words = f"the last 30 % of {'the record' if by_time else 'its path'}, parameters fitted to the first 70 %"
+    of = "the record" if by_time else "its path"
+    rest = percent(1.0 - POLICY.fitted_share)
+    words = f"the last {rest} of {of}, parameters fitted to the first {percent(POLICY.fitted_share)}"
     return Held(scored, words, tuple(len(r) if at is None else at for r, at in zip(records, cuts, strict=True)), notes)
 
 
 def held_out_from(rec: Record) -> int | None:
-    """The first sample that is held out: of the last 30 % of the time or, where one of the parts hardly moves, of the path.
+    """The first sample that is held out: of the last part of the time or, where one of the parts hardly moves, of the path.
 
     None where no cut leaves motion in both parts.
     """

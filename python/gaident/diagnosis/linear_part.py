@@ -4,25 +4,40 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+import numpy as np
+
+from gaident.axis import Text, message_of, say
 from gaident.control.pi import PI
 from gaident.data.record import Record
 from gaident.errors import GaidentError
 from gaident.identification.identify import identify
+from gaident.models.drive_torque import torque_blocks
 from gaident.models.model import Model
 from gaident.results.identification import Identification
 
 __all__ = ["linear_of_part"]
 
+SEEN = (
+    "The samples that are fitted where the others are held out identify no linear model by themselves ({}). The linear model "
+    "of the free run is then the one of all samples. It has seen what is held out, so its error may be smaller than that of a "
+    "model that has not, and the error may fall by more than these figures say."
+)
 
-def linear_of_part(idn: Identification, records: Sequence[Record], pi: PI | None, part: tuple[int, ...] | None) -> Model:
+
+def linear_of_part(
+    idn: Identification, records: Sequence[Record], pi: PI | None, part: tuple[int, ...] | None
+) -> tuple[Model, tuple[Text, ...]]:
     """The model that `idn` found or, of the first `part` samples of each record, the one that the same search finds there.
 
-    The search has the same ranges, settings and seed. Where these samples identify nothing it is the model of all.
+    The search has the same ranges, settings and seed.
+    Where these samples identify no model it is that of all samples, and the second value is a note that says so.
     """
     if part is None:
-        return idn.model
+        return idn.model, ()
+    first = [r[:count] for r, count in zip(records, part, strict=True)]
+    if not any(np.any(u) for r in first for _, u, _ in torque_blocks(r, pi)):
+        return idn.model, (say(SEEN, say("no {torque} drives them")),)
     try:
-        first = [r[:count] for r, count in zip(records, part, strict=True)]
-        return identify(first, pi, space=idn.space, settings=idn.settings, seed=idn.seed).model
-    except GaidentError:
-        return idn.model
+        return identify(first, pi, space=idn.space, settings=idn.settings, seed=idn.seed).model, ()
+    except GaidentError as error:
+        return idn.model, (say(SEEN, message_of(error)),)

@@ -368,7 +368,7 @@ class Work:
     def _take_shorter(self, final: Fit) -> None:
         self.take(compared(self.found, final, self._equivalent_here, self._say))
 
-    def _linear_of_part(self, part: tuple[int, ...] | None) -> Model:
+    def _linear_of_part(self, part: tuple[int, ...] | None) -> tuple[Model, tuple[Text, ...]]:
         """The linear model of so many first samples of each record; identified once, whatever effects are judged beside it."""
         return self.objective.once(("linear model", part), lambda: linear_of_part(self.idn, self.records, self.pi, part))
 

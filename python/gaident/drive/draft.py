@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import json
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,10 +13,12 @@ from gaident.axis import Text, said, say, unit, word
 from gaident.data.formats.units import Constants, factor, needed_constant
 from gaident.data.guess import Guess, guess_channels, unit_from_position, unit_from_velocity
 from gaident.data.listing import Listing
-from gaident.data.timeaxis import SLOW_STEP, stamp_unit
+from gaident.data.timeaxis import SLOW_STEP, even_step, stamp_unit
 from gaident.data.torque_kind import kind_of_torque
+from gaident.drive.draft_lines import head_of, line_of, plain, quoted
 from gaident.drive.log_content import axes_of, gaps_of, with_content
 from gaident.errors import ReadError
+from gaident.policy.table import POLICY
 
 __all__ = ["DriveDraft", "draft"]
 
@@ -30,8 +30,8 @@ _CONSTANTS = {
     "counts_per_turn": ("4096", Text("encoder counts per turn of the motor")),
 }
 SPACE = "where to look, if you know; what is not given is derived from the data"
+NONE: Mapping[str, str | int] = {}
 LIMITS = "what an experiment may do, for `gaident experiment`"
-_COMMENT = 26  # no decision: column where comments begin; column of a page
 
 
 @dataclass(frozen=True)
@@ -49,26 +49,28 @@ class DriveDraft:
     axes: tuple[str, ...] = ()
 
 
-def draft(listing: Listing, values: Mapping[str, NDArray[np.float64]]) -> DriveDraft:
+def draft(listing: Listing, values: Mapping[str, NDArray[np.float64]], options: Mapping[str, str | int] = NONE) -> DriveDraft:
     """The drive.toml for a log; values: its columns in the file's units, {} where it is too long to be looked into.
 
+    options: with which the log is read, keys of the file and their values.
     Raises ReadError where the log contains nothing that could be a channel.
     """
+    given = [f"{key} = {quoted(value)}" for key, value in options.items()]
     several = axes_of(listing)
     if several:
         drafts = {name: _Draft(own, with_content(own, guess, values), values, name) for name, (own, guess) in several.items()}
-        return _together(drafts)
+        return _together(drafts, given)
     guess = with_content(listing, guess_channels(listing), values)
     if not guess.channels and not any(c.samples > 1 for c in listing.columns):
         raise ReadError(f"{listing.path}: the log contains no column of more than one number; give a log of a run")
-    return _Draft(listing, guess, values).done()
+    return _Draft(listing, guess, values).done(given)
 
 
-def _together(drafts: Mapping[str, _Draft]) -> DriveDraft:
+def _together(drafts: Mapping[str, _Draft], given: Sequence[str]) -> DriveDraft:
     """One file for several axes: the time above, what belongs to one axis below [axes.NAME]."""
     first = next(iter(drafts.values()))
-    head = _HEAD.format(log=_quoted(Path(first.listing.path).name)).replace(" identify LOG", " diagnose LOG")
-    parts = [head, *first.clock(), "", "[columns]", *first.time(), "", "[units]", *first.unit_of_time(), ""]
+    parts = [head_of(first.listing.path), *first.clock(), *given, "", "[columns]", *first.time(), ""]
+    parts += ["[units]", *first.unit_of_time(), ""]
     fill = list(first.fill)
     channels: dict[str, str] = {}
     for name, d in drafts.items():
@@ -142,9 +144,8 @@ class _Draft:
         if found is not None:
             self.compared["command"] = found, "velocity"
 
-    def done(self) -> DriveDraft:
-        head = _HEAD.format(log=_quoted(Path(self.listing.path).name))
-        parts = [head, *self.of_axis(), *self.clock(), "", *self.sections(), ""]
+    def done(self, given: Sequence[str]) -> DriveDraft:
+        parts = [head_of(self.listing.path), *self.of_axis(), *self.clock(), *given, "", *self.sections(), ""]
         names = {channel: column.name for channel, column in self.guess.channels.items()}
         return DriveDraft("\n".join(parts), tuple(self.fill), names, self.torque_is)
 
@@ -156,18 +157,18 @@ class _Draft:
         return [*parts, "", *self._section("limits", self._limits(), LIMITS)]
 
     def _section(self, name: str, lines: list[str], comment: str = "") -> list[str]:
-        return [_line(f"[{self.prefix}{name}]", comment), *lines]
+        return [line_of(f"[{self.prefix}{name}]", comment), *lines]
 
     def of_axis(self) -> list[str]:
         """What stands at the top and belongs to the axis."""
         lines = [
-            _line(
+            line_of(
                 f'axis = "{self.axis}"',
                 'or "linear": m, m/s, N, kg' if self.axis == "rotary" else 'or "rotary"',
             )
         ]
         if self.axis == "linear":
-            lines.append(_line('# pitch = "24 mm"', "with which a cogging returns: pitch of the screw, or of the poles"))
+            lines.append(line_of('# pitch = "24 mm"', "with which a cogging returns: pitch of the screw, or of the poles"))
         for name in dict.fromkeys(needed_constant(channel, stated) for channel, stated in self.units.items() if stated):
             if name is not None:
                 value, meaning = _CONSTANTS[name]
@@ -180,13 +181,13 @@ class _Draft:
         if "torque" in self.guess.channels:
             kinds = '"commanded": by the controller; "measured": a current times a constant'
             if self.torque_is is not None:
-                lines.append(_line(f"torque_is = {_quoted(self.torque_is)}", f"as its column's name says; {kinds}"))
+                lines.append(line_of(f"torque_is = {quoted(self.torque_is)}", f"as its column's name says; {kinds}"))
             else:
                 lines.append(self._todo('# torque_is = "measured"', "torque_is", f"{kinds}; commanded is taken"))
         lines.append(
-            _line("# gear_ratio = 10.0", 'turns of the motor per turn of the load, with load_side = ["position"], what was')
+            line_of("# gear_ratio = 10.0", 'turns of the motor per turn of the load, with load_side = ["position"], what was')
         )
-        lines.append(_line("", "measured behind the gear"))
+        lines.append(line_of("", "measured behind the gear"))
         return lines
 
     def clock(self) -> list[str]:
@@ -197,29 +198,37 @@ class _Draft:
             lines.append(self._todo("# dt = 1e-3", "dt", "s; no column looks like time"))
         elif self.gaps:
             some = "a gap" if self.gaps == 1 else f"{self.gaps} gaps"
-            lines.append(_line("pieces = true", f"the time has {some}: what lies around them are records of their own"))
-            lines.append(_line(f"# dt = {self.dt:.9g}", "s, between the gaps; needed for gaident experiment"))
+            lines.append(line_of("pieces = true", f"the time has {some}: what lies around them are records of their own"))
+            lines.append(line_of(f"# dt = {self.dt:.9g}", "s, between the gaps; needed for gaident experiment"))
         elif self.dt is None:
-            lines.append(
-                self._todo(
-                    "# resample = 1e-3", "resample", f"s; the time stamps are irregular: {_plain(time.note if time else '')}"
-                )
-            )
+            lines.append(self._todo(*self._resampling(), f"the time stamps are irregular: {plain(time.note if time else '')}"))
         else:
-            source = f"from the column {_quoted(time.name)}" if time is not None else "as the file states"
-            lines.append(_line(f"# dt = {self.dt:.9g}", f"s, {source}; needed for logs without it, and for gaident experiment"))
-        lines.append(_line("# decimate = 10", "keep every tenth sample behind a low-pass, for very long logs"))
+            source = f"from the column {quoted(time.name)}" if time is not None else "as the file states"
+            lines.append(line_of(f"# dt = {self.dt:.9g}", f"s, {source}; needed for logs without it, and for gaident experiment"))
+        lines.append(line_of("# decimate = 10", "keep every tenth sample behind a low-pass, for very long logs"))
         return lines
+
+    def _resampling(self) -> tuple[str, str, str]:
+        """The line that puts irregular stamps on an even axis, its key, and which values are allowed."""
+        time = self.guess.time
+        stamps = self.values.get(time.name) if time is not None else None
+        steps = np.diff(stamps) * self._second() if stamps is not None else np.zeros(0)
+        usual = float(np.median(steps)) if len(steps) else 0.0
+        if not usual > 0.0:
+            return "# resample = 1e-3", "resample", "s from line to line of an even time axis, a number above 0"
+        least, most = usual / POLICY.resample_finer, usual * POLICY.resample_coarser
+        allowed = f"s from line to line of an even time axis, from {least:.3g} to {most:.3g}"
+        return f"# resample = {even_step(steps)[0]:.6g}", "resample", allowed
 
     def time(self) -> list[str]:
         """The column of the time."""
         found = self.guess.time
-        return [] if found is None else [_line(f"time = {_quoted(found.name)}", "" if found.is_time else "rises evenly")]
+        return [] if found is None else [line_of(f"time = {quoted(found.name)}", "" if found.is_time else "rises evenly")]
 
     def _columns(self) -> list[str]:
         lines = []
         for channel, column in self.guess.channels.items():
-            lines.append(_line(f"{channel} = {_quoted(column.name)}", self.guess.reasons.get(channel, "")))
+            lines.append(line_of(f"{channel} = {quoted(column.name)}", self.guess.reasons.get(channel, "")))
         rest = [
             c.name
             for c in self.listing.columns
@@ -229,7 +238,7 @@ class _Draft:
             and c.lowest != c.highest
         ]
         # no decision: how many columns a remark names
-        others = f"; the log also contains {', '.join(map(_quoted, rest[:8]))}" if rest else ""
+        others = f"; the log also contains {', '.join(map(quoted, rest[:8]))}" if rest else ""
         if not self.guess.channels.keys() & {"velocity", "position"}:
             either = self._either("velocity", "position")
             text = f", not its command: {either}" if either else f" (or position){others}"
@@ -243,10 +252,10 @@ class _Draft:
                 told = f"{text}: {either}" if either else f"{text}{others}"
                 needed = bool(either) or (other not in self.guess.channels and not self._placed)
                 line = f'# {channel} = "..."'
-                lines.append(self._todo(line, channel, told) if needed else _line(line, told))
+                lines.append(self._todo(line, channel, told) if needed else line_of(line, told))
         for channel in ("position", "position_command"):
             if channel not in self.guess.channels and (either := self._either(channel)):
-                lines.append(_line(f'# {channel} = "..."', either))
+                lines.append(line_of(f'# {channel} = "..."', either))
         return lines
 
     @property
@@ -258,7 +267,7 @@ class _Draft:
         """The columns of which one may be the channel, where only the user knows; "" where there are none."""
         names = dict.fromkeys(c.name for channel in channels for c in self.guess.undecided.get(channel, ()))
         free = [name for name in names if name not in {c.name for c in self.guess.channels.values()}]
-        return f"{' or '.join(map(_quoted, free))}?" if free else ""
+        return f"{' or '.join(map(quoted, free))}?" if free else ""
 
     def _units(self) -> list[str]:
         lines = []
@@ -266,13 +275,13 @@ class _Draft:
         for channel in self.guess.channels:
             stated = self.units[channel]
             if stated is not None and _factor(channel, stated) is None:
-                text = f"the log says {_quoted(stated)}, which is not known"
+                text = f"the log says {quoted(stated)}, which is not known"
                 lines.append(self._todo(f'# {channel} = "{si[channel]}"', f"units.{channel}", text))
             elif stated is not None:
-                lines.append(_line(f"{channel} = {_quoted(stated)}", "as the log says"))
+                lines.append(line_of(f"{channel} = {quoted(stated)}", "as the log says"))
             elif channel in self.compared:
                 known, other = self.compared[channel]
-                lines.append(_line(f"{channel} = {_quoted(known)}", f"by comparison with the {other}"))
+                lines.append(line_of(f"{channel} = {quoted(known)}", f"by comparison with the {other}"))
             else:
                 lines.append(
                     self._todo(
@@ -290,7 +299,7 @@ class _Draft:
                 text = f"the log does not say it; with s its lines would be {self.dt:g} s apart"
                 lines.append(self._todo('# time = "ms"', "units.time", text))
             else:
-                lines.append(_line('# time = "s"', "the log does not say it; s is taken"))
+                lines.append(line_of('# time = "s"', "the log does not say it; s is taken"))
         return lines
 
     def _controller(self) -> list[str]:
@@ -300,33 +309,33 @@ class _Draft:
         alone = self._placed and not {"command", "torque"} & self.guess.channels.keys()
         positioned = "position_command" in self.guess.channels
         driven = positioned or "command" in self.guess.channels
-        mark = self._todo if driven else lambda line, _, comment: _line(line, comment)
+        mark = self._todo if driven else lambda line, _, comment: line_of(line, comment)
         torque = word("torque", self.axis)
         place = "# position_gain = 40.0"
         if alone:  # without a torque the loop is all that drives the model
             gain = self._todo(place, "controller.position_gain", "1/s; position command and position drive the loop")
         else:
-            gain = _line(place, "1/s; without it the velocity command drives the loop")
+            gain = line_of(place, "1/s; without it the velocity command drives the loop")
         return [
             mark("# kp = 0.0232", "controller.kp", f"{unit('N m s/rad', self.axis)}; proportional gain {text}"),
             mark("# ki = 1.367", "controller.ki", f"{unit('N m/rad', self.axis)}; integral gain"),
             *(
-                [gain, _line('# velocity_feedforward = "100 %"', "also acceleration_feedforward, position_period")]
+                [gain, line_of('# velocity_feedforward = "100 %"', "also acceleration_feedforward, position_period")]
                 if positioned
                 else []
             ),
-            _line('# loop = "sampled"', f'a digital drive; or "continuous"; or "open": the {torque} drives the model'),
-            _line('# rule = "backward"', 'of the integral, or "forward"; left out: "trapezoidal"'),
-            _line("# torque_limit = 2.4", "a known limit of the controller, and integrator_limit"),
-            _line('# anti_windup = "hold"', 'at a torque_limit; or "tracking" with tracking_time'),
-            _line('# drive = "sinamics"', "with p1460 and p1462 in place of kp and ki: gains as the drive shows them"),
-            _line("# period = 125e-6", "s, of a controller that is faster than the log; also delay, torque_filters, ..."),
+            line_of('# loop = "sampled"', f'a digital drive; or "continuous"; or "open": the {torque} drives the model'),
+            line_of('# rule = "backward"', 'of the integral, or "forward"; left out: "trapezoidal"'),
+            line_of("# torque_limit = 2.4", "a known limit of the controller, and integrator_limit"),
+            line_of('# anti_windup = "hold"', 'at a torque_limit; or "tracking" with tracking_time'),
+            line_of('# drive = "sinamics"', "with p1460 and p1462 in place of kp and ki: gains as the drive shows them"),
+            line_of("# period = 125e-6", "s, of a controller that is faster than the log; also delay, torque_filters, ..."),
         ]
 
     def _space(self) -> list[str]:
         return [
-            _line("# inertia = [1e-4, 5e-3]", said(Text("total inertia at the motor, kg m^2", "total mass, kg"), self.axis)),
-            _line("# resonance_hz = [5, 200]", "where the mechanism may resonate"),
+            line_of("# inertia = [1e-4, 5e-3]", said(Text("total inertia at the motor, kg m^2", "total mass, kg"), self.axis)),
+            line_of("# resonance_hz = [5, 200]", "where the mechanism may resonate"),
         ]
 
     def _limits(self) -> list[str]:
@@ -334,11 +343,11 @@ class _Draft:
         for name, channels, rotary in (("speed", ("velocity", "command"), "rad/s"), ("torque", ("torque",), "N m")):
             largest = self._largest(channels)
             if largest is None:
-                lines.append(_line(f"# {name} = 1.0", unit(rotary, self.axis)))
+                lines.append(line_of(f"# {name} = 1.0", unit(rotary, self.axis)))
             else:
-                lines.append(_line(f"# {name} = {largest:.3g}", f"{unit(rotary, self.axis)}; the largest of this log"))
-        lines.append(_line("# travel = 100.0", said(Text("rad; left out: it may turn freely", "m"), self.axis)))
-        lines.append(_line("# duration = 5.0", "s"))
+                lines.append(line_of(f"# {name} = {largest:.3g}", f"{unit(rotary, self.axis)}; the largest of this log"))
+        lines.append(line_of("# travel = 100.0", said(Text("rad; left out: it may turn freely", "m"), self.axis)))
+        lines.append(line_of("# duration = 5.0", "s"))
         return lines
 
     def _largest(self, channels: tuple[str, ...]) -> float | None:
@@ -357,29 +366,10 @@ class _Draft:
         digits = 2 - math.floor(math.log10(max(found)))
         return float(math.ceil(max(found) * 10.0**digits) / 10.0**digits)
 
-    def _todo(self, line: str, what: str, comment: str) -> str:
+    def _todo(self, line: str, what: str, *comments: str) -> str:
+        comment = "; ".join(comments)
         self.fill.append(f"{what}: {comment}")
-        return _line(line, f"FILL IN: {comment}")
-
-
-_HEAD = """\
-# What belongs to this axis, for `gaident identify LOG --drive drive.toml`. Written by `gaident init` from {log}.
-# FILL IN marks what the log cannot say: write the value and remove the # before it. All other lines are what it shows.
-# Every key: `gaident identify --help`.
-"""
-
-
-def _line(text: str, comment: str) -> str:
-    return f"{text.ljust(_COMMENT - 2)}  # {comment}" if comment else text
-
-
-def _quoted(text: str) -> str:
-    """As TOML and its comments take it, on one line."""
-    return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007f")
-
-
-def _plain(text: str) -> str:
-    return " ".join(text.split())
+        return line_of(line, f"FILL IN: {comment}")
 
 
 def _factor(channel: str, unit: str | None) -> float | None:

@@ -24,8 +24,6 @@ __all__ = ["Log", "centred", "correlation", "correlation_of", "log_of", "numbere
 
 Vector = NDArray[np.float64]
 
-FORGOTTEN = 50  # no decision: lines; five time constants of a low pass of ten lines
-
 
 @dataclass(frozen=True, eq=False)
 class Log:
@@ -64,7 +62,8 @@ def log_of(rec: Record, share: int, cascade: Cascade, whole: bool) -> Log:
     stretch[len(stretch) - cascade.ahead(rec.dt) :] = -1
     moving = starts_moving(part, None)
     if moving:
-        stretch[: min(FORGOTTEN, len(stretch) // 4)] = -1  # no decision: of a short record at most a quarter
+        # no decision: a quarter of the memory, as where few lines are left, and of a short record a quarter of its lines
+        stretch[: min(POLICY.filter_memory // 4, len(stretch) // 4)] = -1
     velocity = smooth_between(part.velocity, every)
     position = part.position if cascade.position is not None else None
     return Log(rec.dt, source, velocity, position, part.torque, stretch, moving)

@@ -73,6 +73,12 @@ class LinearModels:
         REGRESSION,
     )
     lowest_band: float = linear(0.005, "1", "the same, the lowest, whatever the noise: below, little motion is left", REGRESSION)
+    lags_per_root: float = linear(
+        1.3,
+        "1",
+        "lags of the residuals that the deviations of a regression know, over the root of its rows (Lazarus et al. 2018)",
+        REGRESSION,
+    )
     noise_from: float = linear(
         0.35, "1", "of the sample rate, above which the sensor's noise is read: motion is slower", REGRESSION
     )

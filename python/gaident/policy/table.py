@@ -287,7 +287,10 @@ class Decisions:
     )
     quiet_torque: float = loop(0.5, "1", "of the largest torque: below, no limit acts, whatever it limits", FORMS)
     filter_memory: int = loop(
-        200, "samples", "after which no filter remembers a limit; a quarter of it where too few are left", FORMS
+        200,
+        "samples",
+        "after which no filter remembers a limit; a quarter of it where few are left, and at a start in motion",
+        FORMS,
     )
     form_choice: float = loop(2.0 * math.log(3.0), "BIC units", "of a setting chosen of three that has no number: 2 ln 3", FORMS)
     near_rounding: float = loop(
@@ -296,6 +299,10 @@ class Decisions:
     notch_highest: float = loop(
         0.95, "1", "of half the sampling frequency: at a higher one a notch of an unlogged controller is not looked for", UNLOGGED
     )
+    form_fastest: float = loop(
+        0.1, "samples", "of the log: a shorter time constant of an unlogged controller's filter shows in none", UNLOGGED
+    )
+    form_weight: float = loop(2.0, "1", "highest command weight of an unlogged controller: 0 is an IP, 1 a PI one", UNLOGGED)
     form_slowest: float = loop(
         0.1,
         "1",
@@ -332,10 +339,14 @@ class Decisions:
     words_needed: int = reading(
         2, "points", "that have to speak for a column by its name and unit, to take it for a channel", HEADERS
     )
+    name_points: int = reading(4, "points", "of a word that names the channel's quantity (velocity, torque, position)", HEADERS)
+    related_points: int = reading(
+        3, "points", "of a word for what comes with it (a current with a torque, an encoder with a position)", HEADERS
+    )
     unit_points: int = reading(3, "points", "of a unit that is one of the channel's quantity", HEADERS)
     command_points: int = reading(3, "points", "of a word for a command, as much as of a unit: a command is called so", HEADERS)
     letter_points: int = reading(
-        2, "points", "of a single letter (n, M, i); behind a path's other words it says nothing", HEADERS
+        2, "points", "of a letter or two (n, M, i, qm); behind a path's other words it says nothing", HEADERS
     )
     least_letters: int = reading(
         3, "letters", "of a known word that is looked for inside a longer one: shorter ones are in any", HEADERS

@@ -15,7 +15,7 @@ from gaident.data.record import Record
 from gaident.diagnosis.experiments.excitation import position_of
 from gaident.diagnosis.explain.missing_torque import missing_torque
 from gaident.diagnosis.gains import closed_over, free_run_errors
-from gaident.diagnosis.held_parts import IN_SAMPLE, VALIDATION, held_out_from
+from gaident.diagnosis.held_parts import VALIDATION, held_out_from
 from gaident.diagnosis.records.hygiene import cleaned, outliers
 from gaident.errors import GaidentError
 from gaident.estimation.dataset import DataSet
@@ -44,7 +44,7 @@ def run_of(result: Diagnosis | Identification, rec: Record) -> RecordView:
         rec = result.as_used(rec)
         if digest in result.validation_digests:
             used, first_held_out = "held out", 0
-        elif used == "fitted" and result.held_out not in (IN_SAMPLE, VALIDATION):
+        elif used == "fitted" and not result.in_sample and result.held_out != VALIDATION:
             first_held_out = held_out_from(rec)
         closed = closed_over(result.controller, (rec,), [e.name for e in result.model.effects])
         aged = DataSet.of([rec], result.controller).aged(result.velocity_age)

@@ -17,7 +17,7 @@ from gaident.providers import picture, provided
 from gaident.results.estimate import Estimate
 from gaident.results.experiment import Proposal
 from gaident.results.finding import Finding, finding_of, where
-from gaident.results.fitness import Comparison, Fitness
+from gaident.results.fitness import IN_SAMPLE, Comparison, Fitness
 from gaident.results.identification import Identification
 from gaident.results.inverse_dynamics import InverseDynamics
 from gaident.results.relevance import Relevance
@@ -56,7 +56,7 @@ class Diagnosis(SavedResult):
     gain_interval : tuple of float
         95 % interval of the fall of the error from `before` to `after`, as a fraction [1].
     held_out : str
-        How the figures of `before` and `after` were held out ("in-sample" where they could not be).
+        How the figures of `before` and `after` were held out (see `in_sample` where they could not be).
     base_shift : mapping of str to tuple of float
         Parameter of the linear part -> (before, after).
     left : mapping of str to float
@@ -178,6 +178,11 @@ class Diagnosis(SavedResult):
         """The findings that describe the drive."""
         return tuple(f for f in self.findings if not f.is_noise)
 
+    @property
+    def in_sample(self) -> bool:
+        """Whether the figures of `before` and `after` are of the samples that were fitted: none could be held out."""
+        return self.held_out == IN_SAMPLE
+
     def as_used(self, rec: Record) -> Record:
         """Return a record as the diagnosis used it.
 
@@ -218,8 +223,7 @@ class Diagnosis(SavedResult):
         str
             Verdict, causes, gain, what to measure next, and what could not be tested.
         """
-        text: str = provided("diagnosis_summary")(self, axis or self.axis, units)
-        return text
+        return str(provided("diagnosis_summary")(self, axis or self.axis, units))
 
     def plot(self, records: Record | Sequence[Record] | None = None, axis: str | None = None) -> Figure:
         """Draw what is wrong and what is left.
@@ -277,8 +281,7 @@ class Diagnosis(SavedResult):
 
     def _repr_html_(self) -> str:
         """What a notebook shows."""
-        html: str = provided("diagnosis_html")(self)
-        return html
+        return str(provided("diagnosis_html")(self))
 
     def to_pandas(self) -> Any:
         """Return the findings as a pandas DataFrame: a row per (effect, parameter), with what speaks for it.
@@ -387,10 +390,7 @@ class Diagnosis(SavedResult):
                 mechanics={n: Estimate(**e) for n, e in data.get("mechanics", {}).items()},
                 regression=None if data.get("regression") is None else InverseDynamics.from_dict(data["regression"]),
                 regression_force_error=data.get("regression_force_error"),
-                comparisons=tuple(
-                    Comparison(c["name"], Estimate(**c["diagnosis"]), Estimate(**c["regression"]), c["differs"])
-                    for c in data.get("comparisons", ())
-                ),
+                comparisons=tuple(map(Comparison.from_dict, data.get("comparisons", ()))),
                 force_reason=restored(data.get("force_reason", ""), linear),
                 left_needed=data.get("left_needed", 0.0),
                 axis=data.get("axis", "rotary"),

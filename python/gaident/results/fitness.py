@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 from gaident.results.estimate import Estimate
 
-__all__ = ["Comparison", "Fitness"]
+__all__ = ["IN_SAMPLE", "Comparison", "Fitness"]
+
+IN_SAMPLE = "in-sample"
+"""What a result says of figures that could not be held out; `Diagnosis.in_sample` asks for it."""
 
 
 @dataclass(frozen=True)
@@ -61,3 +66,8 @@ class Comparison:
     diagnosis: Estimate
     regression: Estimate
     differs: bool
+
+    @classmethod
+    def from_dict(cls, data: Mapping[str, Any]) -> Comparison:
+        """The inverse of `dataclasses.asdict`."""
+        return cls(data["name"], Estimate(**data["diagnosis"]), Estimate(**data["regression"]), data["differs"])

@@ -139,9 +139,10 @@ def missing_orders(position: Vector, dhat: Vector, velocity: Vector, axis: str) 
         "passes the dashed level is more than chance."
     )
     if not len(lines.order):
-        none = Panel(y, (), note=said(say("{} travelled: too {}", turns(travel), Text("few", "little")), axis))
+        few = say("{} between the lowest and the highest {angle}: too {}", turns(travel), Text("few", "little"))
+        none = Panel(y, (), note=said(few, axis))
         return Chart("missing-orders", name, (none,), text, height=320)
-    reached = f"{said(turns(travel, 3), axis)} travelled"
+    reached = said(say("over {}", turns(travel, 3)), axis)
     trace = Trace(lines.order / scale, lines.amplitude, reached, "faster", width=1.0)
     level = Trace(lines.order / scale, lines.level, "1 % level of chance", "noise", dash="dash", width=1.8)
     marked: list[float] = []

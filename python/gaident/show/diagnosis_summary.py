@@ -16,14 +16,19 @@ from gaident.show.relevance_words import bent_of, part_words, relevance_words, r
 from gaident.show.second_method import comparison_rows, force_rows, force_words, method_words
 from gaident.show.units import Scales, beside, scales_of
 from gaident.show.wording import (
+    NOT_AS_GIVEN,
+    SPREAD,
     WIDTH,
     cause_words,
     certainty,
     controller_lines,
+    diverges,
     either,
     free_run_words,
     missing_words,
+    not_as_given,
     number,
+    step_words,
     table,
     with_std,
     words,
@@ -39,6 +44,7 @@ __all__ = [
     "mechanical_name",
     "moved_words",
     "next_words",
+    "noise_words",
     "parameter_row",
     "verdict_words",
 ]
@@ -118,10 +124,12 @@ def verdict_words(dia: Diagnosis, axis: str) -> str:
     if dia.verdict == "unexplained":
         return "The model is wrong, and no effect of the library fits what is left."
     causes = [f for f in dia.findings if not f.is_noise]
-    named = list(dict.fromkeys(cause_words(f, dia, axis) for f in causes if not f.alternatives))
+    given = [f for f in causes if not f.alternatives and f.effect in NOT_AS_GIVEN]
+    named = list(dict.fromkeys(cause_words(f, dia, axis) for f in causes if not f.alternatives and f not in given))
     kinds = dict.fromkeys(filter(None, (missing_words(f, dia, axis) for f in causes if f.alternatives)))
     open_ = dict.fromkeys(either(f, dia, axis) for f in causes if f.alternatives and not missing_words(f, dia, axis))
     parts = [f"{'Cause' if len(named) == 1 else 'Causes'}: {', '.join(named)}."] if named else []
+    parts += [f"{Text(not_as_given(f, axis)).begun()}." for f in given]
     parts += [f"{text[0].upper()}{text[1:]}." for text in kinds]
     parts += [
         f"What is {'also ' if named else ''}missing is one of: {names}. These data do not tell them apart." for names in open_
@@ -130,7 +138,7 @@ def verdict_words(dia: Diagnosis, axis: str) -> str:
         return " ".join(["Part of what the model gets wrong is explained; something significant is left.", *parts])
     if open_:
         return " ".join(["The model was wrong.", *parts, "With that nothing significant is left."])
-    found = "the cause is found, and with it" if len(named) == 1 else "the causes are found, and with them"
+    found = "the cause is found, and with it" if len(named) + len(given) == 1 else "the causes are found, and with them"
     return " ".join([f"The model was wrong, {found} nothing significant is left.", *parts])
 
 
@@ -179,17 +187,32 @@ def _gain(dia: Diagnosis, axis: str, scales: Scales) -> list[str]:
         shown, size = scales[v]
         sizes = (dia.before.rmse, dia.after.rmse, dia.after.noise_floor)
         rows = [(*row, more) for row, more in zip(rows, (f"rmse [{shown}]", *(number(size * x) for x in sizes)), strict=True)]
-    in_sample = dia.held_out == "in-sample"
-    where = "IN-SAMPLE: too little data, or too little motion, to hold any out" if in_sample else f"on {dia.held_out}"
+    where = "IN-SAMPLE: too little data, or too little motion, to hold any out" if dia.in_sample else f"on {dia.held_out}"
     lines = [f"Free-run simulation, {where}", *table(rows if extended else [rows[0], rows[1], rows[3]])]
+    if noise := noise_words(dia):
+        lines += _wrapped(said(noise, axis), "  ")
     if not dia.loop_follows:
         lines += _wrapped(said(not_the_loop_words(dia), axis), "  ")
     if extended and dia.before.rmse > 0.0:
         lines += _wrapped(said(fall_words(dia), axis), "  ")
-        steps = [f"{cause_words(f, dia, axis)} {100.0 * f.gain:.0f} %" for f in dia.findings if not f.is_noise]
+        steps = [f"{cause_words(f, dia, axis)} {step_words(f.gain)}" for f in dia.findings if not f.is_noise]
         if len(steps) > 1:
             lines += _wrapped(f"One after the other, each of what was left before it: {', '.join(steps)}.", "  ")
     return lines
+
+
+def noise_words(dia: Diagnosis) -> Text:
+    """What an encoder's steps make of the noise, where a free run leaves less than what was estimated; empty elsewhere."""
+    found = (f.parameters["step"] for f in dia.findings if f.is_noise and "step" in f.parameters)
+    step = next((e.value for e in found if e.unit == "rad/s"), None)
+    if step is None or dia.noise is not None or not dia.after.rmse < dia.after.noise_floor:
+        return Text("")
+    text = (
+        "The free run leaves less than this noise, which is estimated from third differences as if it were white. Steps of {} "
+        "{rad/s} make {} {rad/s} rms where the velocity itself is rounded, and {} {rad/s} where it is the difference of two "
+        "rounded {angles}: that noise is not white."
+    )
+    return say(text, number(step), number(step / math.sqrt(12.0), 3), number(step / math.sqrt(6.0), 3))
 
 
 def not_the_loop_words(dia: Diagnosis) -> Text:
@@ -206,7 +229,7 @@ def _force(dia: Diagnosis, axis: str) -> list[str]:
     rows = force_rows(dia, axis)
     if not rows:
         return []
-    where = "IN-SAMPLE" if dia.held_out == "in-sample" else f"on {dia.held_out}"
+    where = "IN-SAMPLE" if dia.in_sample else f"on {dia.held_out}"
     torque = "torque" if axis == "rotary" else "force"
     head = ("", f"rms [{unit('N m', axis)}]", f"of the {torque} [%]")
     return [f"{word('Torque', axis)} error, {where}", *table([head, *rows]), *_wrapped(force_words(dia, axis), "  ")]
@@ -223,6 +246,11 @@ def _second_method(dia: Diagnosis, axis: str) -> list[str]:
 
 def fall_words(dia: Diagnosis) -> str:
     """By how much the error falls, in words."""
+    if diverges(dia.after):
+        linear = "so does the linear one" if diverges(dia.before) else "the linear one does not"
+        return Text(f"In free run the extended model diverges, {linear}.")
+    if diverges(dia.before):
+        return Text("In free run the linear model diverges, the extended one does not.")
     fall = 100.0 * (1.0 - dia.after.rmse / dia.before.rmse)  # no decision: percent
     low, high = (100.0 * x for x in dia.gain_interval)
     if fall < -1.0:
@@ -244,9 +272,18 @@ def fall_words(dia: Diagnosis) -> str:
 def _growth_words(dia: Diagnosis, growth: float) -> Text:
     """Why the error of the velocity grows, by so many percent, and what the names rest on then."""
     if not dia.loop_follows:
-        return say("The error of the velocity grows by {:.0f} %: the simulated controller is not the drive's.", growth)
+        text = (
+            "In free run the extended model is worse than the linear one (the error of the velocity grows by {:.0f} %): the "
+            "simulated controller is not the drive's."
+        )
+        return say(text, growth)
     varies = "beyond" if dia.gain_interval[1] < 0.0 else "within"
-    grows = say("The error of the velocity grows by {:.0f} %, {} its variation over the record", growth, varies)
+    grows = say(
+        "In free run the extended model is worse than the linear one: the error of the velocity grows by {:.0f} %, {} its "
+        "variation over the record",
+        growth,
+        varies,
+    )
     before, after = dia.before.force_error, dia.after.force_error
     if after is not None and (before is None or after < before):
         was = "diverges without the effects" if before is None else f"was {number(before)}"
@@ -273,6 +310,8 @@ def _mechanics(dia: Diagnosis, axis: str) -> list[str]:
         u = "" if e.unit == "1" else unit(e.unit, axis)
         rows.append((mechanical_name(name, axis), with_std(e.value, e.std), u, remark_words(dia, name, e)))
     lines = [head, *table(rows)]
+    if any(e.std is not None and e.std > 0.0 for e in dia.mechanics.values()):
+        lines.append(f"  +- {SPREAD}")
     if "resonance" not in dia.mechanics and len(dia.model.poles) > 1:
         lines.append("  a second pair of poles that does not swing: no resonance of a shaft")
     return lines
@@ -298,7 +337,11 @@ def moved_words(old: float, new: float, std: float | None) -> str:
     """By how much a parameter moved; empty where it was 0 within its deviation, for no share of that means anything."""
     if not math.isfinite(old) or abs(old) <= POLICY.below_zero * (std or 0.0):
         return ""
-    return f"{round(100.0 * (new / old - 1.0), 1) + 0.0:+.1f} %" if old * new > 0.0 else "other sign"
+    if old * new <= 0.0:
+        return "other sign"
+    if new / old >= 10.0:  # no decision: how a number is printed
+        return f"{number(new / old, 3)} times as large"
+    return f"{round(100.0 * (new / old - 1.0), 1) + 0.0:+.1f} %"
 
 
 def _record(dia: Diagnosis, axis: str) -> list[str]:

@@ -69,7 +69,7 @@ def _verdict(idn: Identification, axis: str, scales: Scales) -> list[str]:
     figures = (
         f"fit {number(idn.fit_percent)} %",
         ", ".join(filter(None, (f"rmse {number(idn.rmse)} {v}", beside(scales, "", idn.rmse, None, v)))),
-        f"noise {number(idn.adequacy.noise_std)} {velocity_unit(axis)}",
+        f"white part of it {number(idn.adequacy.noise_std)} {velocity_unit(axis)}",
         f"{idn.samples} samples of {records} record{'s' if records != 1 else ''}",
     )
     return [

@@ -14,10 +14,19 @@ from gaident.results.fitness import Fitness
 
 __all__ = [
     *("cause_words", "certainty", "controller_lines", "either", "free_run_words", "missing_words", "number", "size_words"),
-    *("WIDTH", "structure_words", "table", "with_std", "words"),
+    *("NOT_AS_GIVEN", "SPREAD", "WIDTH", "diverges", "not_as_given", "step_words", "structure_words", "table", "with_std"),
+    "words",
 ]
 
 WIDTH = 100  # no decision: letters of a line
+GAINS = {"kp", "ki"}
+SPREAD = "is the spread that noise alone makes; what the model gets wrong may move a value further."
+"""Of a standard deviation; stands behind its sign."""
+NOT_AS_GIVEN = {
+    "integration_rule": "the integration rule of the controller is not given",
+    "other_gains": "the controller has other gains than the given ones",
+}
+"""Finding -> what differs in the controller itself: the model of the axis lacks nothing by it."""
 _ANGULAR = ("frequency", "zero_frequency")  # angular frequencies in rad/s, which are read in Hz
 
 
@@ -37,11 +46,24 @@ def number(value: float, digits: int = 4) -> str:  # no decision: how a number i
     return f"{value + 0.0:.{digits}g}" if math.isfinite(value) else "-" if math.isnan(value) else f"{value}"
 
 
+def diverges(run: Fitness) -> bool:
+    """Whether the error of a free run is `diverged` times the motion: no figure of a model."""
+    return run.fit_percent < 100.0 * (1.0 - POLICY.diverged)  # no decision: in percent
+
+
 def free_run_words(run: Fitness, written: Callable[[float], str] = number) -> tuple[str, str]:
-    """(rmse, fit in percent) of a free run; one whose error is `diverged` times the motion has diverged: no figures."""
-    if run.fit_percent < 100.0 * (1.0 - POLICY.diverged):  # no decision: in percent
+    """(rmse, fit in percent) of a free run; one that diverges has no figures."""
+    if diverges(run):
         return "diverges", ""
     return written(run.rmse), f"{run.fit_percent:.2f}"
+
+
+def step_words(gain: float) -> str:
+    """By how much an effect lets the error of the free run fall, of what was left before it: "83 %"."""
+    if gain < -1e3:  # no decision: how a number is printed
+        return "nothing (the free run diverges)"
+    share = round(100.0 * gain)
+    return f"{share} %" if share >= 0 else f"nothing (the free run is worse: its error grows by {-share} %)"
 
 
 def with_std(value: float, std: float | None) -> str:
@@ -99,7 +121,13 @@ def either(finding: Finding, dia: Diagnosis, axis: str) -> str:
 
 
 def size_words(finding: Finding, axis: str) -> str:
-    """How large it is, by its first parameter: "0.12 N m"; "" where that is not determined or has no unit."""
+    """How large it is, by its first parameter: "0.12 N m"; "" where that is not determined or has no unit.
+
+    Gains of a controller are shown together: "kp 0.52 N m s/rad, ki 20.7 N m/rad".
+    """
+    if finding.parameters and set(finding.parameters) <= GAINS:
+        shown = {n: e for n, e in sorted(finding.parameters.items(), reverse=True) if math.isfinite(e.value)}
+        return ", ".join(f"{n} {number(e.value, 3)} {unit(e.unit, axis)}" for n, e in shown.items())
     name, e = next(iter(finding.parameters.items()), ("", None))
     if e is None or not e.identifiable or not math.isfinite(e.value) or e.unit == "1":
         return ""
@@ -107,6 +135,12 @@ def size_words(finding: Finding, axis: str) -> str:
         return f"{number(e.value / math.tau, 3)} Hz"
     value, u = (1e3 * e.value, "ms") if e.unit == "s" else (e.value, unit(e.unit, axis))
     return f"{number(value, 3)} {u}"
+
+
+def not_as_given(finding: Finding, axis: str) -> str:
+    """What a finding of `NOT_AS_GIVEN` says of the controller, with its numbers where it has some."""
+    size = size_words(finding, axis)
+    return NOT_AS_GIVEN[finding.effect] + (f" ({size})" if size else "")
 
 
 def missing_words(finding: Finding, dia: Diagnosis, axis: str) -> str:

@@ -186,7 +186,9 @@ def test_init_writes_a_drive_file_that_identify_takes(here: Path, capsys: pytest
     # The line to go on with is one that a shell takes.
     Path("my step.csv").write_bytes(Path("step.csv").read_bytes())
     assert main(["init", "my step.csv", "--out", "my.toml"]) == 0
-    assert "then, once that is done: gaident identify 'my step.csv' --drive my.toml" in capsys.readouterr().out
+    assert "then, once that is done: gaident diagnose 'my step.csv' --drive my.toml" in capsys.readouterr().out
+    head = Path("my.toml").read_text().splitlines()[0]
+    assert "for `gaident diagnose LOG --drive drive.toml`" in head and head.endswith('from "my step.csv".')
     # Every commented key is one that the file may have.
     for line in text.splitlines():
         key = line.removeprefix("# ").split("=")[0].strip()
@@ -285,6 +287,29 @@ def test_log_options_of_drive_file_and_command_line(here: Path, capsys: pytest.C
         drive.read("gap.csv")
     assert main(["identify", "gap.csv", "--columns", "velocity=speed_act,torque=torque,time=t"]) == 2
     assert "--resample 0.001" in capsys.readouterr().err
+
+
+def test_init_says_which_steps_an_even_axis_may_have(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    stamps = np.cumsum(np.where(np.arange(400) % 2, 10, 12))
+    lines = (f"{t},{np.sin(1e-3 * t)},{np.cos(1e-3 * t)}" for t in stamps)
+    Path("jitter.csv").write_text("\n".join(["time [ms],velocity [rad/s],torque [Nm]", *lines]))
+    assert main(["init", "jitter.csv", "--out", "jitter.toml"]) == 0
+    said = "resample: s from line to line of an even time axis, from 0.0001 to 0.015; the time stamps are irregular: "
+    assert said in capsys.readouterr().out
+    text = Path("jitter.toml").read_text()
+    assert "\n# resample = 0.011        # FILL IN: s from line to line of an even time axis, from 0.0001 to 0.015;" in text
+    from gaident.cli import COMMANDS
+    from gaident.cli.drive import drive_of
+    from gaident.cli.options import parser_of
+
+    for step, allowed in ((0.011, True), (0.015, True), (0.016, False), (0.00009, False)):
+        Path("even.toml").write_text(text.replace("# resample = 0.011 ", f"resample = {step} "))
+        asked = drive_of(parser_of(COMMANDS).parse_args(["identify", "jitter.csv", "--drive", "even.toml", "--loop", "open"]))
+        if allowed:
+            assert asked.read("jitter.csv").dt == step
+        else:
+            with pytest.raises(ga.GaidentError, match="resample"):
+                asked.read("jitter.csv")
 
 
 def test_experiment_writes_the_command_of_a_first_record(here: Path, capsys: pytest.CaptureFixture[str]) -> None:

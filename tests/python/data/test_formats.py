@@ -16,6 +16,7 @@ from gaident.data import read, read_columns
 from gaident.data.formats import delimited
 from gaident.data.formats import stored as stored_module
 from gaident.data.signals.resampling import resampled
+from gaident.data.timeaxis import even_step
 from gaident.errors import ReadError, RecordError
 from places import SAMPLES
 from samples.dialects import sample_log
@@ -83,6 +84,28 @@ def test_irregular_stamps_are_refused_and_resampled_on_request() -> None:
     # From the first command on, 0.17 ms behind the first velocity.
     expected = np.interp(0.17e-3 + rec.time, REC.time, REC.velocity)
     np.testing.assert_allclose(rec.velocity, expected, atol=5e-3)  # doubles tell such stamps to 256 ns only
+
+
+@pytest.mark.parametrize("unit", [1.0, 1e-3])
+def test_stamps_that_jitter_are_those_of_samples_a_mean_step_apart(tmp_path: Path, unit: float) -> None:
+    """Steps of 10 and 12 ms in turn: neither is the sample time."""
+    stamps = np.cumsum(np.where(np.arange(400) % 2, 10.0, 12.0))
+    name = "time [ms]" if unit == 1.0 else "time [s]"
+    columns = np.column_stack([unit * stamps, np.sin(1e-3 * stamps), np.cos(1e-3 * stamps)])
+    np.savetxt(tmp_path / "log.csv", columns, delimiter=",", header=f"{name},velocity,torque", comments="")
+    with pytest.raises(ReadError, match=r"its steps are (11|0\.011) on average; put it on an even axis with") as caught:
+        read(tmp_path / "log.csv")
+    assert "resample=0.011;" in str(caught.value) and "give dt=0.011 and" in str(caught.value)
+    assert read(tmp_path / "log.csv", resample=0.011).dt == 0.011
+    assert read(tmp_path / "log.csv", columns={"time": None, "velocity": "velocity", "torque": "torque"}, dt=0.011).dt == 0.011
+
+
+def test_even_samples_are_the_usual_step_apart_where_few_stamps_differ() -> None:
+    assert even_step(np.array([2.0] * 30 + [6.0])) == (2.0, False)
+    assert even_step(np.array([10.0, 12.0] * 20)) == (11.0, True)
+    assert even_step(np.array([10.0, 12.0] * 20 + [500.0])) == (11.0, True)  # a pause is none of them
+    rng = np.random.default_rng(1)
+    assert even_step(np.diff(np.arange(5000) * 1.25 + rng.uniform(-0.4, 0.4, 5000))) == (1.25, True)
 
 
 def test_a_pause_of_the_logger_is_not_bridged(tmp_path: Path) -> None:

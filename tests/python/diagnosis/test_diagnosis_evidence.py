@@ -283,6 +283,15 @@ def test_the_staircase_triggers_almost_everything() -> None:
     assert "reversals" in found.sentence
 
 
+def test_a_short_range_of_the_angle_is_called_a_range() -> None:
+    """Back and forth over 1.5 rad: the path is long, and the range is what orders need."""
+    t = 1e-3 * np.arange(8000)
+    w = 0.75 * 4.0 * np.cos(4.0 * t)
+    said = excitation(ga.Record(1e-3, velocity=w, torque=1e-3 * w)).one_sided["cogging"]
+    assert "need more than the 0.24 turns between the lowest and the highest angle of a record" in said
+    assert "need more than the 1.5 m between the lowest and the highest position of a record" in said.linear
+
+
 def test_a_single_step_says_what_it_cannot_judge() -> None:
     still = ga.Record(0.444e-3, np.full(250, 43.6), np.zeros(250))
     done = ga.run(ONE_MASS, still, CONTROLLER)

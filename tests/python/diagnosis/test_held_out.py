@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -12,9 +14,11 @@ from gaident.axis import Text
 from gaident.diagnosis.check import Check
 from gaident.diagnosis.explain.held_out import standing
 from gaident.diagnosis.gains import Gains, interval_of_fall
-from gaident.diagnosis.held_parts import IN_SAMPLE, held_out_from, held_parts
+from gaident.diagnosis.held_parts import held_out_from, held_parts
 from gaident.diagnosis.linear_part import linear_of_part
-from gaident.results.diagnosis import Fitness
+from gaident.errors import RecordError
+from gaident.policy.table import POLICY
+from gaident.results.fitness import IN_SAMPLE, Fitness
 
 MODEL = ga.OneMass(3e-4, 1e-3).model()
 RNG = np.random.default_rng(1)
@@ -124,6 +128,12 @@ def test_what_is_held_out_holds_motion(count: int, still: int, before: int, at: 
     assert words.startswith("the last 30 % of the record," if not still + before else "the last 30 % of its path,")
 
 
+def test_words_and_cut_have_the_share_of_the_policy(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("gaident.diagnosis.held_parts.POLICY", replace(POLICY, fitted_share=0.6))
+    held = held_parts([moving(3000)], [], None)
+    assert held.words == "the last 40 % of the record, parameters fitted to the first 60 %" and held.part == (1800,)
+
+
 def test_a_record_for_validation_at_rest_judges_nothing() -> None:
     rec, still, other = moving(3000), moving(0, 1500, seed=2), moving(1500, seed=3)
     held = held_parts([rec], [still], None)
@@ -143,7 +153,7 @@ def test_a_fall_of_the_error_at_standstill_is_none_and_is_said() -> None:
     dia = ga.diagnose(rec, validation=still)
     assert dia.held_out.startswith("the last 30 % of the record") and any("hold" in n and "no motion" in n for n in dia.notes)
     dia = ga.diagnose(friction_record(600, 2400))
-    assert dia.held_out == IN_SAMPLE and "too little motion, to hold any out" in dia.summary()
+    assert dia.in_sample and "too little motion, to hold any out" in dia.summary()
 
 
 def friction_record(count: int, still: int) -> ga.Record:
@@ -164,9 +174,40 @@ def test_the_linear_model_is_one_of_the_samples_that_are_fitted() -> None:
         w = np.append(w, ga.simulate(ga.OneMass(J, 3e-3), ga.Record(1e-3, torque=u, velocity=0.0 * u)))
     rec = ga.Record(1e-3, velocity=w + 0.03 * rng.standard_normal(len(w)), torque=torque)
     idn = ga.identify(rec, seed=1)
-    first = linear_of_part(idn, [rec], None, (2100,))
-    assert 1.0 / first.gain == pytest.approx(1e-3, rel=0.01) and 1.0 / idn.model.gain > 1.05e-3
-    assert linear_of_part(idn, [rec], None, None) is idn.model
+    first, notes = linear_of_part(idn, [rec], None, (2100,))
+    assert notes == () and 1.0 / first.gain == pytest.approx(1e-3, rel=0.01) and 1.0 / idn.model.gain > 1.05e-3
+    assert linear_of_part(idn, [rec], None, None) == (idn.model, ())
+
+
+def coasting() -> ga.Record:
+    """An axis that slows down by itself for 2100 samples, and is driven for 900."""
+    rng = np.random.default_rng(5)
+    torque = np.concatenate([np.full(300, 0.3), np.zeros(2100), np.repeat(rng.uniform(-0.2, 0.2, 9), 100)])
+    drive = ga.OneMass(1e-3, 3e-3).model().with_effect("coulomb_friction", torque=0.004)
+    w = ga.simulate(drive, ga.Record(1e-3, torque=torque, velocity=0.0 * torque))
+    return ga.Record(1e-3, torque=torque, velocity=w + 0.03 * rng.standard_normal(len(w)))[300:]
+
+
+def test_a_linear_model_that_has_seen_what_is_held_out_is_said_to_have() -> None:
+    dia = ga.diagnose(coasting())
+    said = [n for n in dia.notes if "identify no linear model by themselves" in n]
+    assert dia.held_out.startswith("the last 30 % of the record") and len(said) == 1, dia.notes
+    assert "(no torque drives them)" in said[0] and "It has seen what is held out" in said[0]
+    assert "(no force drives them)" in said[0].linear  # type: ignore[attr-defined]
+    # The model of all samples, not one that nothing determines.
+    assert dia.before.rmse < 5.0
+
+
+def test_what_identify_refuses_is_the_reason(monkeypatch: pytest.MonkeyPatch) -> None:
+    rec = moving(3000)
+    idn = ga.identify(rec, seed=1)
+
+    def refused(*args: object, **options: object) -> None:
+        raise RecordError("too short")
+
+    monkeypatch.setattr("gaident.diagnosis.linear_part.identify", refused)
+    model, notes = linear_of_part(idn, [rec], None, (2100,))
+    assert model is idn.model and len(notes) == 1 and "by themselves (too short)" in notes[0]
 
 
 def test_noise_of_a_torque_is_no_floor_beyond_the_motion_and_is_that_of_the_extended_model() -> None:

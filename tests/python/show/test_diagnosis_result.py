@@ -21,6 +21,7 @@ from gaident.diagnosis.explain.wording import evidence_of
 from gaident.errors import GaidentError, RecordError, SettingsError
 from gaident.results.diagnosis import Comparison, Fitness
 from gaident.results.finding import Finding
+from gaident.show.report.diagnosis import headline
 from gaident.show.wording import certainty
 from places import GOLDEN
 
@@ -93,6 +94,7 @@ def fake() -> Any:
         next_experiment=ga.Proposal(np.zeros(2000), DT, ("cogging", "velocity_ripple"), 412.3, "Slow speeds: several turns."),
         gain_interval=(0.55, 0.64),
         held_out="validation records",
+        in_sample=False,
         controller_numbers={},
         relevance=None,
         base_shift={
@@ -181,7 +183,7 @@ def test_a_gain_that_is_none_is_not_called_one() -> None:
     assert "in the velocity." in flat(summary(result)) and "shows it" not in summary(result)
     result.before = Fitness(0.5, 97.0, 0.49)
     assert "it is at the noise with and without" in flat(summary(result))
-    result.held_out = "in-sample"
+    result.in_sample = True
     assert "IN-SAMPLE: too little data, or too little motion, to hold any out" in flat(summary(result))
 
 
@@ -192,11 +194,87 @@ def test_a_mechanism_that_diverges_along_the_motion_has_no_force_error() -> None
     assert "mechanism without effects diverges" in flat(summary(result))
 
 
+def test_what_an_encoder_makes_of_the_noise_is_said_where_the_free_run_leaves_less() -> None:
+    """A difference of two rounding errors, each even over a step q, has the deviation q/sqrt(6)."""
+    result = fake()
+    steps = Finding("velocity_quantisation", {"step": ga.Estimate(0.024, 0.0, "rad/s")}, is_noise=True)
+    result.findings, result.noise = (steps, *result.findings), None
+    assert "third differences" not in summary(result)
+    result.after = replace(result.after, rmse=0.0097, noise_floor=0.016)
+    text = flat(summary(result))
+    assert "Steps of 0.024 rad/s make 0.00693 rad/s rms where the velocity itself is rounded, and 0.0098 rad/s where" in text
+    assert "the difference of two rounded positions" in flat(summary(result, "linear"))
+    e = np.random.default_rng(0).uniform(-0.5, 0.5, 100_000)
+    assert 0.024 * np.diff(e).std() == pytest.approx(0.0098, rel=0.01)
+    result.noise = 0.016
+    assert "third differences" not in summary(result)
+
+
+def test_a_free_run_that_diverges_has_no_percentage() -> None:
+    result = fake()
+    result.after = Fitness(1e150, -1e155, 0.1)
+    assert "In free run the extended model diverges, the linear one does not." in flat(summary(result))
+    result.before = Fitness(1e150, -1e155, 0.1)
+    assert "In free run the extended model diverges, so does the linear one." in flat(summary(result))
+    result.after = fake().after
+    assert "In free run the linear model diverges, the extended one does not." in flat(summary(result))
+
+
+@pytest.mark.parametrize(
+    ("gain", "words"),
+    [
+        (0.834, "83 %"),
+        (-0.002, "0 %"),
+        (-0.53, "nothing (the free run is worse: its error grows by 53 %)"),
+        (-4e187, "nothing (the free run diverges)"),
+    ],
+)
+def test_what_a_step_removes_is_said_in_words(gain: float, words: str) -> None:
+    result = fake()
+    noise, friction, ripple = result.findings
+    result.findings = (noise, replace(friction, gain=gain), ripple)
+    assert f"of what was left before it: coulomb friction {words}, cogging 20 %." in flat(summary(result))
+
+
+def test_a_parameter_that_moved_by_more_than_ten_times_says_how_many() -> None:
+    result = fake()
+    result.base_shift = {"inertia": (6.88e-4 / 15.7, 6.88e-4)}
+    assert "15.7 times as large" in summary(result)
+
+
+@pytest.mark.parametrize(
+    ("effect", "parameters", "words"),
+    [
+        ("integration_rule", {}, "The integration rule of the controller is not given; with it nothing significant is left."),
+        (
+            "other_gains",
+            {"kp": ga.Estimate(0.52, 1e-4, "N m s/rad"), "ki": ga.Estimate(20.7, 0.1, "N m/rad")},
+            "The controller has other gains than the given ones (kp 0.52 N m s/rad, ki 20.7 N m/rad); with it nothing",
+        ),
+    ],
+)
+def test_what_differs_in_the_controller_is_no_lack_of_the_model(
+    effect: str, parameters: dict[str, ga.Estimate], words: str
+) -> None:
+    result = fake()
+    result.verdict = "explained"
+    of_controller = Finding(effect, parameters, place="controller")
+    result.findings = (of_controller,)
+    assert headline(result, "rotary").startswith(words)
+    found = "The model was wrong, the cause is found, and with it nothing significant is left."
+    assert flat(summary(result)).startswith(f"Verdict: explained {found} {words.partition(';')[0]}. ")
+    result.findings = (of_controller, fake().findings[1])
+    assert headline(result, "rotary").startswith("The model lacks coulomb friction (0.0412 N m); the ")
+    if parameters:
+        assert "kp 0.52 N s/m, ki 20.7 N/m" in headline(result, "linear")
+
+
 def test_an_error_that_grows_is_said_to_and_not_to_be_compared() -> None:
     result = fake()
     result.after = Fitness(1.5, 80.0, 0.1)
     text = flat(summary(result))
-    assert "grows by 200 %, within its variation over the record: the effects were found on" in text and "hardly" not in text
+    assert "In free run the extended model is worse than the linear one: the error of the velocity grows by 200 %, within" in text
+    assert "within its variation over the record: the effects were found on" in text and "hardly" not in text
     assert "closed over this controller" in text
     result.controller = None
     text = flat(summary(result))
@@ -210,7 +288,7 @@ def test_an_error_that_grows_is_said_to_and_not_to_be_compared() -> None:
     assert "falls (diverges without the effects, is 0.0123 N m)" in flat(summary(result))
     result.loop_follows = False
     text = flat(summary(result))
-    assert "grows by 200 %: the simulated controller is not the drive's." in text
+    assert "worse than the linear one (the error of the velocity grows by 200 %): the simulated controller is not the" in text
     assert "(see above): the logged torque drives these models, no loop is closed." in text
     result.torque_logged = False
     text = flat(summary(result))

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import json
 import shlex
 from pathlib import Path
 from typing import Any
@@ -36,13 +35,9 @@ def init_command(args: argparse.Namespace) -> None:
     options = _text_options(args)
     listing = columns(args.log, **options)
     small = Path(args.log).stat().st_size <= _LOOKED_INTO
-    found = draft(listing, read_columns(args.log, **options) if small else {})
     told = {key: value for key, value in options.items() if value is not None}
-    text = found.text
-    if told:
-        lines = "\n".join(f"{key} = {json.dumps(value, ensure_ascii=False)}" for key, value in told.items())
-        text = text.replace("\n[columns]", f"\n{lines}\n\n[columns]", 1)
-    write(target, text.encode())
+    found = draft(listing, read_columns(args.log, **options) if small else {}, told)
+    write(target, found.text.encode())
     if args.json:
         print_json({
             "schema": "gaident/init", "schema_version": 1, "written": str(target), "channels": dict(found.channels),
@@ -59,8 +54,7 @@ def init_command(args: argparse.Namespace) -> None:
         for line in found.fill_in:
             print(f"  {line}")
     then = "then, once that is done" if found.fill_in else "then"
-    command = "diagnose" if found.axes else "identify"
-    print(f"{then}: {program()} {command} {shlex.quote(str(args.log))} --drive {shlex.quote(str(target))}")
+    print(f"{then}: {program()} diagnose {shlex.quote(str(args.log))} --drive {shlex.quote(str(target))}")
 
 
 def _text_options(args: argparse.Namespace) -> dict[str, Any]:

@@ -1,4 +1,9 @@
-"""The menu of experiments: what each is good at, and its command within what the axis may do."""
+"""The menu of experiments: what each is good at, and its command within what the axis may do.
+
+The shares of speed, time and jump below are shapes of commands.
+They decide nothing about a record: a diagnosis is made before a command is proposed.
+They do set which command is proposed: other shares make another menu, of which the one is taken that tells most in simulation.
+"""
 
 from __future__ import annotations
 

@@ -27,7 +27,6 @@ from collections.abc import Callable, Collection, Sequence
 from gaident.axis import Text, joined, say
 from gaident.diagnosis.check import Check
 from gaident.diagnosis.gains import Gains
-from gaident.diagnosis.held_parts import IN_SAMPLE
 from gaident.diagnosis.library.sides import called_of, name_of
 from gaident.diagnosis.library.terms import LIBRARY, of_inverse_dynamics
 from gaident.policy.table import POLICY
@@ -52,7 +51,7 @@ def standing(
         return [], ()
     low, high = gains.interval
     worse = high < 0.0 and gains.before.rmse < (1.0 - POLICY.harm) * gains.after.rmse
-    if gains.held_out == IN_SAMPLE:
+    if gains.in_sample:
         return list(causes), (say(IN_SAMPLE_WORSE, check.before.rmse, check.after.rmse),) if worse else ()
     matters = (worse and not _force_falls(check)) or check.loses
     if matters or (low <= 0.0 and check.regression_better):

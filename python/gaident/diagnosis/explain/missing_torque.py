@@ -35,7 +35,7 @@ __all__ = ["MissingTorque", "missing_torque"]
 
 Vector = NDArray[np.float64]
 
-FORGETS = 1e-3, 0.9998  # no decision: slowest pole of the filter, between which its memory is reckoned
+FORGETS = 1e-3, 0.9998  # no decision: poles that bound its memory: a start is forgotten, exact to 1e-9, in 5 to 103 600 steps
 LEAST_NOISE = 1e-5  # no decision: of the velocity's range; a log smoothed beyond that would make any torque of its last digits
 DECADES = (-4.0, -3.0, -2.0, -1.0, 0.0, 1.0, 2.0)  # no decision: a grid
 """Of walk per sample over the noise, seen at the velocity after one sample."""

@@ -152,7 +152,7 @@ def _monotone(m: SeenMotion, apart: float) -> bool:
 def part_of_a_turn(s: Motions) -> Text | None:
     """A torque once per turn changes over the travel."""
     if s.travel < POLICY.gravity_turn * TURN:
-        return say("{}: over so little it is a constant load", _travelled(s))
+        return say("{}: over so little it is a constant load", _reach(s))
     return None
 
 
@@ -160,7 +160,7 @@ def period_of_an_order(s: Motions) -> Text | None:
     """The travel contains a period of the highest order that a drive is expected to have."""
     highest = HIGHEST_ORDER * _per_turn(s)
     if s.travel < TURN / highest:
-        return say("{} contain no period of order {} or less", _travelled(s), order(highest))
+        return say("{} contain no period of order {} or less", _reach(s), order(highest))
     return None
 
 
@@ -179,8 +179,9 @@ def _per_turn(s: Motions) -> float:
     return TURN / (s.period or TURN)
 
 
-def _travelled(s: Motions) -> Text:
-    return Text(f"{math.degrees(s.travel):.2g} degrees of travel", f"{s.travel:.2g} m of travel")
+def _reach(s: Motions) -> Text:
+    size = Text(f"{math.degrees(s.travel):.2g} degrees", f"{s.travel:.2g} m")
+    return say("{} between the lowest and the highest {angle}", size)
 
 
 def torque_reverses(s: Motions) -> Text | None:
@@ -295,13 +296,14 @@ def resonance_beyond(s: Motions) -> Text:
 def orders_beyond(s: Motions) -> Text | None:
     """Orders of the angle too low for the travel, or too high for the sampling."""
     one = _per_turn(s)
-    travelled = s.travel * one / TURN  # periods of the first order
-    least = math.ceil(POLICY.seen_periods / travelled) if travelled > 0.0 else HIGHEST_ORDER
-    if least == 2 and travelled > POLICY.seen_turn:  # no decision: the second order, below which the first one shows
+    reached = s.travel * one / TURN  # periods of the first order
+    least = math.ceil(POLICY.seen_periods / reached) if reached > 0.0 else HIGHEST_ORDER
+    if least == 2 and reached > POLICY.seen_turn:  # no decision: the second order, below which the first one shows
         least = 1
     per_sample = max(_slowest_held(m) * m.dt for m in s.records)
     fastest = math.floor(POLICY.seen_band * math.pi / per_sample / one) if per_sample > 0.0 else None
-    below = say("orders below {} need more than the {} travelled", order(least * one), turns(s.travel))
+    text = "orders below {} need more than the {} between the lowest and the highest {angle} of a record"
+    below = say(text, order(least * one), turns(s.travel))
     parts = [below] if least > (1 if s.period else 2) else []  # of a turn, order 1 is an unbalance
     if fastest is not None and fastest < HIGHEST_ORDER:
         parts.append(say("orders above {} are faster than the sampling even at the slowest speed held", order(fastest * one)))

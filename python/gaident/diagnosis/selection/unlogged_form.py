@@ -112,16 +112,17 @@ REACH = (1.0 + POLICY.gain_doubt) / (1.0 - POLICY.gain_doubt)
 """Largest ratio of ki/kp to the given one."""
 
 RATIO = _Number("integral_gain", "1", lambda dt, duration: (1.0 / REACH, REACH), lambda dt, duration: (1.0,))
-WEIGHT = _Number("weight", "1", lambda dt, duration: (0.0, 2.0), lambda dt, duration: (0.0, 0.5), logarithm=False)
+WEIGHT = _Number("weight", "1", lambda dt, duration: (0.0, POLICY.form_weight), lambda dt, duration: (0.0, 0.5), logarithm=False)
 TIME_CONSTANT = _Number(
     "time_constant",
     "s",
-    lambda dt, duration: (0.1 * dt, POLICY.form_slowest * duration),
+    lambda dt, duration: (POLICY.form_fastest * dt, POLICY.form_slowest * duration),
     lambda dt, duration: np.geomspace(0.5 * dt, 0.1 * POLICY.form_slowest * duration, POLICY.form_starts),
 )
 FREQUENCY = _Number(
     "frequency", "Hz", _band, lambda dt, duration: np.geomspace(*_band(dt, duration), 2 * POLICY.form_starts + 1)[1:-1]
 )
+# From undamped zeros to real ones, with which a filter has no notch.
 OF_ZEROS = _Number("numerator_damping", "1", lambda dt, duration: (0.0, 1.0), lambda dt, duration: (0.1,), logarithm=False)
 OF_POLES = _Number(
     "denominator_damping",

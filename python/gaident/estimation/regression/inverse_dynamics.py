@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from gaident.axis import TURN, Text, checked_axis, say, turns
+from gaident.axis import TURN, Text, checked_axis, percent, say, turns
 from gaident.data.record import Record
 from gaident.errors import RecordError, SettingsError
 from gaident.estimation.criterion import bic, effective_samples
@@ -66,7 +66,7 @@ def inverse_dynamics(
         Velocity up to which the axis stands [rad/s]. None: the rule above. 0.0: nothing is left out, as in the literature.
     validation : Record or sequence of Record, optional
         Records that are not fitted, for the held-out force error.
-        None: the last 30 % of the samples in motion of each record are held out from a second fit of the same terms.
+        None: the last samples in motion of each record are held out from a second fit of the same terms, see `held_out`.
     axis : {"rotary", "linear"}
         "rotary" or "linear" (m, m/s, N). Gravity depends on the angle of a rotary axis only.
 
@@ -293,5 +293,7 @@ def _held_out(rows: Sequence[Rows], result: InverseDynamics, validation: Record 
     first, last = zip(*(r.split(POLICY.fitted_share) for r in rows), strict=True)
     theta, rank = _fitted(first, result.terms)
     if rank < len(theta):
-        return float("nan"), "no part: the first 70 % of the samples in motion do not determine the terms"
-    return _relative([r.torque - r.of(result.terms) @ theta for r in last], last), "the last 30 % of the samples in motion"
+        part = percent(POLICY.fitted_share)
+        return float("nan"), f"no part: the first {part} of the samples in motion do not determine the terms"
+    which = f"the last {percent(1.0 - POLICY.fitted_share)} of the samples in motion"
+    return _relative([r.torque - r.of(result.terms) @ theta for r in last], last), which

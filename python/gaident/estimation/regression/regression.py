@@ -4,7 +4,7 @@
     cov   = (X'X)^-1 S (X'X)^-1
     S     = sum_j k(j) sum_i (x_i r_i)(x_i-j r_i-j)',   k(j) = 1 - |j|/(L + 1) for |j| <= L       (Newey and West 1987)
 
-L = 1.3 sqrt(n), as Lazarus, Lewis, Stock and Watson (2018) recommend for tests.
+L = lags_per_root sqrt(n), with 1.3 as Lazarus, Lewis, Stock and Watson (2018) recommend for tests.
 No deviation is smaller than that of white residuals.
 Columns are chosen by the criterion of all models (estimation/criterion.py), with the independent samples of the residuals.
 Theory: docs/theory/inverse-dynamics.md.
@@ -20,12 +20,13 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from gaident.policy.table import POLICY
+
 __all__ = ["covariance", "solve"]
 
 Vector = NDArray[np.float64]
 Matrix = NDArray[np.float64]
 
-LAGS_PER_ROOT = 1.3  # no decision: bandwidth of an estimate of variance: its theory asks for a multiple of the root, see above
 SOLVER_RANK = 1e-10  # no decision: of a solver
 """Singular values below this share of the largest, of columns of equal length, are zero."""
 
@@ -55,8 +56,8 @@ def covariance(X: Sequence[Matrix], residuals: Sequence[Vector]) -> Matrix:
     for part, r in zip(X, residuals, strict=True):
         scores = part / scale * r[:, None]
         middle += scores.T @ scores
-        for lag in range(1, min(int(np.ceil(LAGS_PER_ROOT * np.sqrt(len(r)))), len(r) - 1) + 1):
-            weight = 1.0 - lag / (np.ceil(LAGS_PER_ROOT * np.sqrt(len(r))) + 1.0)
+        for lag in range(1, min(int(np.ceil(POLICY.lags_per_root * np.sqrt(len(r)))), len(r) - 1) + 1):
+            weight = 1.0 - lag / (np.ceil(POLICY.lags_per_root * np.sqrt(len(r))) + 1.0)
             product = scores[lag:].T @ scores[:-lag]
             middle += weight * (product + product.T)
     robust = inverse @ middle @ inverse

@@ -22,6 +22,7 @@ from gaident.show.diagnosis_summary import (
     mechanical_name,
     moved_words,
     next_words,
+    noise_words,
     not_the_loop_words,
     parameter_row,
 )
@@ -47,7 +48,18 @@ from gaident.show.report.parts import (
 )
 from gaident.show.report.views import View
 from gaident.show.second_method import comparison_rows, force_rows, force_words, method_words
-from gaident.show.wording import cause_words, either, free_run_words, missing_words, words
+from gaident.show.wording import (
+    NOT_AS_GIVEN,
+    SPREAD,
+    cause_words,
+    diverges,
+    either,
+    free_run_words,
+    missing_words,
+    not_as_given,
+    step_words,
+    words,
+)
 
 __all__ = ["chapters", "headline", "mark", "tiles"]
 
@@ -74,11 +86,15 @@ def headline(dia: Diagnosis, axis: str) -> str:
     causes = [f for f in dia.findings if not f.is_noise]
     if not causes:
         return "The model is wrong, and no effect of the library fits what is left."
-    named = list(dict.fromkeys(cause_words(f, dia, axis, sized=True) for f in causes if not f.alternatives))
+    given = [f for f in causes if not f.alternatives and f.effect in NOT_AS_GIVEN]
+    named = list(dict.fromkeys(cause_words(f, dia, axis, sized=True) for f in causes if not f.alternatives and f not in given))
     listed = " and ".join(filter(None, (", ".join(named[:-1]), *named[-1:])))
     lacks = [listed] if named else []
     lacks += list(dict.fromkeys(_open(f, dia, axis) for f in causes if f.alternatives))
-    text = f"The model lacks {'; and '.join(lacks)}"
+    parts = [f"the model lacks {'; and '.join(lacks)}"] if lacks else []
+    parts += [not_as_given(f, axis) for f in given]
+    text = "; ".join(parts)
+    text = f"{text[0].upper()}{text[1:]}"
     if dia.verdict == "partly explained":
         return f"{text}; this explains a part of what it gets wrong, and something significant is left."
     return f"{text}; with {'it' if len(causes) == 1 else 'them'} nothing significant is left."
@@ -97,7 +113,7 @@ def tiles(dia: Diagnosis, view: View) -> Html:
     """The figures seen first."""
     v = velocity_unit(view.axis)
     _, size = view.scales.get(v, (v, 1.0))
-    where = "in-sample" if dia.held_out == "in-sample" else "held-out data"
+    where = "in-sample" if dia.in_sample else "held-out data"
     shown = [tile(f"error, linear model ({where})", number(size * dia.before.rmse), _unit_of(dia.before.rmse, v, view))]
     if dia.model.effects:
         shown.append(tile(f"error, extended model ({where})", number(size * dia.after.rmse), _unit_of(dia.after.rmse, v, view)))
@@ -108,11 +124,12 @@ def tiles(dia: Diagnosis, view: View) -> Html:
             _unit_of(dia.after.noise_floor, v, view),
         )
     )
-    if dia.model.effects and dia.before.rmse > 0.0:
+    if dia.model.effects and dia.before.rmse > 0.0 and not (diverges(dia.before) or diverges(dia.after)):
         low, high = dia.gain_interval
         interval = typeset(f"95 % interval of the fall: {percent(low)} to {percent(high)} %") if math.isfinite(low) else ""
         fall = 1.0 - dia.after.rmse / dia.before.rmse
-        label = "the error grows by" if fall < -0.005 else "the error falls by"  # no decision: what is printed as 0 %
+        worse = fall < -0.005  # no decision: what is printed as 0 %
+        label = "worse in free run: the error grows by" if worse else "the error falls by"
         shown.append(tile(label, typeset(f"{percent(abs(fall))} %"), interval))
     return joined(shown)
 
@@ -159,9 +176,9 @@ def _causes(dia: Diagnosis, view: View) -> Section:
         others = (words(a, axis) for a in f.alternatives)
         name = joined((tag("b", cause_words(f, dia, axis)), *(joined((" or ", tag("b", other))) for other in others)))
         rows: list[Row] = [(n, *map(typeset, cells), remark) for n, *cells, remark in map(_row(view), f.parameters.items())]
-        kind = "in-sample" if dia.held_out == "in-sample" else "held-out"
+        kind = "in-sample" if dia.in_sample else "held-out"
         place = f"Place: {f.place}. " if f.place else ""
-        figures = f"{place}{f.delta_bic:.0f} BIC units; the {kind} error falls by {percent(f.gain)} % of what was left before it."
+        figures = f"{place}{f.delta_bic:.0f} BIC units; {kind}, it removes of the error left before it {step_words(f.gain)}."
         parts.append(
             box(
                 tag("h3", name, " ", tag("small", "cannot be told apart" if f.alternatives else "named")),
@@ -209,7 +226,7 @@ def _parameters(dia: Diagnosis, view: View, drawn: Charts) -> Section:
             parts.append(table(("", "value", "unit", "linear fit alone", "moved", ""), [rows]))
         else:
             parts.append(table(("", "value", "unit", ""), [[(*r[:3], r[5]) for r in rows]]))  # no decision: columns of a table
-        parts.append(tag("p", tag("small", "± is one standard deviation, the colour of the noise taken into account.")))
+        parts.append(tag("p", tag("small", f"± {SPREAD} The colour of the noise is taken into account.")))
     if any(not f.is_noise for f in dia.findings):
         parts.append(tag("p", "The parameters of the effects stand with their cause above."))
     parts += [tag("h3", f"{word('Torque', axis)} to velocity, linear part")]
@@ -235,7 +252,7 @@ def _gain(dia: Diagnosis, view: View, drawn: Charts) -> Section:
         rows.append(("extended model", *_free_run(dia.after)))
     rows.append(("noise of the measured velocity", number(dia.after.noise_floor), ""))
     parts: list[str] = []
-    if dia.held_out == "in-sample":
+    if dia.in_sample:
         text = (
             "In-sample: there were too few data, or too little motion, to hold any out. Parameters were fitted to the same "
             "samples: this flatters them."
@@ -244,6 +261,8 @@ def _gain(dia: Diagnosis, view: View, drawn: Charts) -> Section:
     else:
         parts.append(tag("p", "Free-run simulation on ", dia.held_out, "."))
     parts.append(table(("", f"rmse [{v}]", "fit [%]"), [rows]))
+    if noise := noise_words(dia):
+        parts.append(tag("p", typeset(said(noise, axis))))
     if not dia.loop_follows:
         parts.append(box(tag("p", typeset(said(not_the_loop_words(dia), axis))), kind="warn"))
     if extended and dia.before.rmse > 0.0:

@@ -61,7 +61,7 @@ def tiles(idn: Identification, view: View) -> Html:
     return joined((
         tile("fit of the free run (in-sample)", typeset(f"{idn.fit_percent:.2f} %")),
         tile("error (in-sample)", number(idn.rmse), v),
-        tile("noise", number(idn.adequacy.noise_std), v),
+        tile("white part of the error", number(idn.adequacy.noise_std), v),
     ))  # fmt: skip
 
 

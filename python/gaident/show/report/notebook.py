@@ -39,7 +39,7 @@ def diagnosis_html(dia: Diagnosis) -> Html:
     errors: list[Row] = [("linear model", *free_run_words(dia.before, number))]
     if dia.model.effects:
         errors.append(("extended model", *free_run_words(dia.after, number)))
-    errors.append(("noise", number(dia.after.noise_floor), ""))
+    errors.append(("noise of the velocity", number(dia.after.noise_floor), ""))
     where = f"{UNITS}; {dia.held_out}"
     return _framed(diagnosis.head(dia, View(axis=dia.axis)), causes, table(("", "rmse", "fit [%]"), [errors], left=(0,)), where)
 
@@ -54,7 +54,10 @@ def identification_html(idn: Identification) -> Html:
             for name, u in m.UNITS.items()
         ]
         parts = table(("", "value", "unit", ""), [rows], left=(0, 2, 3))
-    errors: list[Row] = [("model", number(idn.rmse), f"{idn.fit_percent:.2f}"), ("noise", number(idn.adequacy.noise_std), "")]
+    errors: list[Row] = [
+        ("model", number(idn.rmse), f"{idn.fit_percent:.2f}"),
+        ("white part of it", number(idn.adequacy.noise_std), ""),
+    ]
     return _framed(identification.head(idn), parts, table(("", "rmse", "fit [%]"), [errors], left=(0,)), f"{UNITS}; in-sample")
 
 

@@ -47,7 +47,15 @@ def _overview(results: Sequence[Shown]) -> Section:
         errors = [None if e is None else number(size * e) for e in sizes]
         link = tag("a", name, href=f"#result-{i}")
         rows.append((link, f"{sign} {verdict}", typeset(_causes(result, view.axis)), *errors, typeset(v)))
-    head = ("", "verdict", "cause", "error, linear model", "with the effects", "noise", "")
+    head = (
+        "",
+        "verdict",
+        "cause",
+        "error, linear model",
+        "with the effects",
+        "noise (of a linear model alone: white part of its error)",
+        "",
+    )
     return Section("overview", "Overview", tag("div", table(head, [rows]), class_="overview"))
 
 

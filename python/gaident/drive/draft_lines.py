@@ -1,0 +1,35 @@
+"""The lines of a drive.toml that `init` writes: its head, and what stands beside a key."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+__all__ = ["head_of", "line_of", "plain", "quoted"]
+
+_COMMENT = 26  # no decision: column where comments begin; column of a page
+
+
+def head_of(log: str) -> str:
+    """What the file says of itself; log: path of the log that it was written from."""
+    name = quoted(Path(log).name)
+    return f"""\
+# What belongs to this axis, for `gaident diagnose LOG --drive drive.toml`. Written by `gaident init` from {name}.
+# FILL IN marks what the log cannot say: write the value and remove the # before it. All other lines are what it shows.
+# Every key: `gaident identify --help`.
+"""
+
+
+def line_of(text: str, comment: str) -> str:
+    """A line with its comment behind it."""
+    return f"{text.ljust(_COMMENT - 2)}  # {comment}" if comment else text
+
+
+def quoted(value: str | int) -> str:
+    """A text or a number as TOML and its comments take it, on one line."""
+    return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
+
+
+def plain(text: str) -> str:
+    """A text without line breaks."""
+    return " ".join(text.split())
