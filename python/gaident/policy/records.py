@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from gaident.policy.declared import DRIVES, ENCODER, LOOP, REAL, REGRESSION, SHORT, SUCCESS, record
+from gaident.policy.declared import DRIVES, ENCODER, LOOP, REAL, REGRESSION, SAMPLED, SHORT, SUCCESS, record
 
 __all__ = ["Records"]
 
@@ -53,5 +53,11 @@ class Records:
     seen_periods: float = record(2.0, "periods", "in the travel, of what returns more often; less is any curve", DRIVES)
     seen_path: float = record(3.0, "periods", "that a record travels at least, there and back, to show an order", DRIVES)
     seen_band: float = record(0.8, "1", "of half the sampling frequency: what is faster does not show", DRIVES)
+    seen_measured: float = record(
+        0.35,
+        "1",
+        "the same of a shaft under a measured torque: 1 - sinc(f dt)^2, what is unknown between its samples, is 10 %",
+        SAMPLED,
+    )
     gravity_turn: float = record(1 / 6, "turns", "of travel: below, a torque once per turn is a constant or a spring", REGRESSION)
     swing_damping: float = record(0.5, "1", "damping ratio below which two masses swing as on a shaft", DRIVES)

@@ -90,10 +90,12 @@ class ModelSpace:
 
         One mass has no such bounds. Below `rigid_below` the records show one rigid body.
         A resonance faster than the controller's samples show replaces another fast effect.
+        A measured torque is known at its samples only: what it does between them shows as a fast resonance sooner.
         """
         line = fit.parameters.scales.dt / fit.parameters.scales.blocks  # of the log, also on a coarse grid
         every = 1 if self.data.controller is None else self.data.controller.log_every(line)
-        seen = self.policy.seen_band * np.pi * every / line
+        band = self.policy.seen_measured if self.data.torque_measured else self.policy.seen_band
+        seen = band * np.pi * every / line
         return swings(fit) and (fit.parameters.masses == 1 or self.rigid_below <= resonance(fit) < seen)
 
     def score(self, fit: Fit) -> float:
