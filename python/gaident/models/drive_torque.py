@@ -67,8 +67,8 @@ def torque_driven(records: Sequence[Record], controller: Controller | None) -> D
     every = max(controller.log_every(r.dt) for r in records)
     if every == 1:
         text = (
-            "The controller has more to it than kp and ki with the trapezoidal rule: the linear model is identified from its "
-            "{torque}, not in a simulated loop."
+            "The given controller is not kp and ki with the trapezoidal rule alone; it has another rule, a filter, a feedforward "
+            "or a limit. So the linear model is identified from its {torque}, not in a simulated loop."
         )
         note = say(text)
     else:
