@@ -31,7 +31,7 @@ from gaident.diagnosis.explain.wording import (
     evidence_of,
     far_off,
     hidden_by_torque_noise,
-    of_the_controller,
+    of_the_mechanics,
     or_other_form,
     or_other_gains,
     period_seen,
@@ -292,7 +292,7 @@ class Work:
         if driver is not None and (dropped := [e for e in self.final.effects if e not in causes]):
             shown = driver if self.left.gains[driver] > self.left.needed else None
             self.notes.append(closest(dropped, shown, bool(real)))
-        self.notes += (*of_the_controller(mechanics), *check.notes)
+        self.notes += (*of_the_mechanics(mechanics), *check.notes)
         if self.final.parameters.on_a_spring and any(LIBRARY[e].constant for e in self.final.effects):
             self.notes.append(
                 Text("The axis is on a spring to the ground: its tension where the record starts is part of the constant load.")

@@ -15,7 +15,7 @@ from gaident.control.found import FoundNumbers
 from gaident.diagnosis.controller.controller_place import AsLogged
 from gaident.diagnosis.controller.driving import Driving
 from gaident.diagnosis.controller.log_shift import Aligned
-from gaident.diagnosis.explain.wording import closer_numbers, of_the_controller
+from gaident.diagnosis.explain.wording import closer_numbers, of_the_mechanics
 from gaident.results.estimate import Estimate
 from gaident.results.finding import Finding
 from one_mass import STEPS, TAU, filtered
@@ -98,10 +98,10 @@ def test_where_the_controller_makes_most_of_a_deviation_that_is_said(part: float
         "viscous_friction": Estimate(2e-3, 1e-4, "N m s/rad"),
         "resonance": Estimate(100.0, 0.0, "Hz", of_controller=0.0),
     }
-    notes = [said(note, "rotary") for note in of_the_controller(mechanics)]
+    notes = [said(note, "rotary") for note in of_the_mechanics(mechanics)]
     assert len(notes) == noted
     if noted:
         assert "Most of the deviation of inertia comes from" in notes[0], "of no other"
     both = {**mechanics, "viscous_friction": Estimate(2e-3, 1e-4, "N m s/rad", of_controller=1e-4)}
-    (note,) = of_the_controller(both)
+    (note,) = of_the_mechanics(both)
     assert ("inertia, viscous friction" in said(note, "rotary")) is noted

@@ -14,6 +14,7 @@ from gaident.diagnosis.selection.select import Selection
 from gaident.estimation.dataset import DataSet
 from gaident.models.effect_rows import end_words
 from gaident.models.effects import row_of
+from gaident.policy.table import POLICY
 from gaident.results.estimate import Estimate
 
 __all__ = [
@@ -24,7 +25,7 @@ __all__ = [
     "evidence_of",
     "far_off",
     "hidden_by_torque_noise",
-    "of_the_controller",
+    "of_the_mechanics",
     "or_other_form",
     "or_other_gains",
     "period_seen",
@@ -113,6 +114,22 @@ def drives_itself(damping: Estimate) -> Text:
     return say(text, damping.value)
 
 
+def _swings_up(mechanics: Mapping[str, Estimate]) -> list[Text]:
+    """Notes on a pair of poles or zeros with a negative damping, which no shaft and no load has."""
+    text = (
+        "The {} has a damping ratio of {:.2g}, below 0 beyond its deviation; no shaft and no load has that. The pair stands for "
+        "something else: load {inertia} and stiffness are not to be trusted."
+    )
+    pairs = (Text("resonance"), Text("antiresonance"))
+    found = ((pair, mechanics.get(f"{pair}_damping")) for pair in pairs)
+    return [say(text, pair, e.value) for pair, e in found if e is not None and e.value < -POLICY.contradiction * e.std]
+
+
+def of_the_mechanics(mechanics: Mapping[str, Estimate]) -> list[Text]:
+    """Notes on what was estimated of the mechanism."""
+    return _swings_up(mechanics) + _of_the_controller(mechanics)
+
+
 def torque_unlogged(data: DataSet) -> list[Text]:
     """Note on records without a torque: the given gains alone say which torque drove the motor."""
     if data.controller is None or any(r.torque is not None for r in data.read):
@@ -167,7 +184,7 @@ def closer_numbers(torque: FoundNumbers, model: FoundNumbers) -> Text:
     return say(text, float(np.abs(model.deviations_off).max(initial=0.0)))
 
 
-def of_the_controller(mechanics: Mapping[str, Estimate]) -> list[Text]:
+def _of_the_controller(mechanics: Mapping[str, Estimate]) -> list[Text]:
     """What is said where most of the deviations of the mechanics comes from numbers of the controller that were found."""
     mostly = [name for name, e in mechanics.items() if 2.0 * e.of_controller**2 > e.std**2 > 0.0]  # no decision: half of it
     text = (
