@@ -58,9 +58,6 @@ __all__ = ["Specification", "bic", "chi_square_bound", "cost_of", "effective_sam
 
 Vector = NDArray[np.float64]
 
-LOWEST = 8  # no decision: frequencies of a record's spectrum whose mean is S(0); that is uncertain by 1/sqrt(8)
-SAMPLES_PER_LAG = 10  # no decision: rho^2 is taken at one lag for so many samples; at more it is mostly its own error
-
 
 def bic(variance: float, information: float, numbers: int) -> float:
     """I ln(variance) + k ln I."""
@@ -104,13 +101,13 @@ def effective_samples(*errors: Vector) -> float:
     pairs = (products[1:] / products[0])[: (longest - 1) // 2 * 2].reshape(-1, 2).sum(axis=1)
     negative = np.flatnonzero(~(pairs > 0.0))
     slow = float(pairs[: negative[0]].sum()) if len(negative) else float(pairs.sum())
-    squares = products[1 : 1 + longest // SAMPLES_PER_LAG] ** 2 / products[0] ** 2
+    squares = products[1 : 1 + longest // POLICY.samples_per_lag] ** 2 / products[0] ** 2
     chance = (count - np.arange(1, len(squares) + 1)) / count**2  # what rho^2 of white errors is in the mean
     swinging = float(np.sum(squares - chance))
     memory = 1.0 + 2.0 * slow  # no decision: as below
     if swinging > max(slow, POLICY.swings):
-        lowest = sum(float(np.sum(np.abs(np.fft.rfft(e - mean)[1 : 1 + LOWEST]) ** 2)) for e in errors)
-        spectral = lowest / (products[0] * sum(min(LOWEST, len(e) // 2) * len(e) for e in errors) / count)
+        lowest = sum(float(np.sum(np.abs(np.fft.rfft(e - mean)[1 : 1 + POLICY.spectrum_lines]) ** 2)) for e in errors)
+        spectral = lowest / (products[0] * sum(min(POLICY.spectrum_lines, len(e) // 2) * len(e) for e in errors) / count)
         memory = max(1.0 + 2.0 * swinging, spectral)  # no decision: as below
     return float(np.clip(count / memory, 1.0, count))  # no decision: variances of means of correlated samples
 

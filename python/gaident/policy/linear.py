@@ -91,6 +91,12 @@ class LinearModels:
         "of the lowest antiresonance, the highest cutoff of a force error: beyond, the inversion follows a swing",
         DRIVES,
     )
+    inversion_gain: float = linear(
+        0.4, "1", "of the gain that leads an integrator in one step to its command: the stiff loop of a force error", DRIVES
+    )
+    inversion_integral: float = linear(
+        0.02, "1", "of that gain, a step: what friction and gravity leave is gone within the filter's time", DRIVES
+    )
     force_edge: float = linear(
         2.0,
         "1",

@@ -132,6 +132,10 @@ class Decisions:
     grid_loss: float = noise(
         0.02, "1", "part of the linear model's squared error beyond the noise that lies between the lines of a coarser grid", REAL
     )
+    spectrum_lines: int = noise(8, "1", "frequencies whose mean is a spectrum at 0, which is uncertain by 1/sqrt(8)", REAL)
+    samples_per_lag: int = noise(
+        10, "samples", "for each lag at which rho^2 is taken; at more lags it is mostly its own error", REAL
+    )
     swings: float = noise(0.5, "1", "sum of rho^2 of errors, from which they swing where it is above the sum of rho", REAL)
 
     direction_samples: int = noise(

@@ -40,11 +40,6 @@ __all__ = ["FilteredRecords", "ForceError", "band_of", "effects_before_the_shaft
 Vector = NDArray[np.float64]
 TorqueOf = Callable[[Record], Vector]
 
-LOOP = 0.4  # no decision: of a solver; at twice of it a two-mass drive's force error of 0.72 % is 0.74 %, at half it is 2.5 %
-"""Gain of the stiff loop, of the one that takes an integrator to its command in a single step."""
-INTEGRAL = 0.02  # no decision: of a solver; at half and at twice of it the same figure is 0.68 and 0.78 %
-"""Of the proportional gain, in each step: what friction and gravity leave of the error is gone within the filter's time."""
-
 
 @dataclass(frozen=True)
 class ForceError:
@@ -251,14 +246,14 @@ def _led(model: Model, rec: Record, motion: Motion, cutoff_hz: float) -> Vector:
     dt = rec.dt / fine
     grid, at = np.arange(n) * rec.dt, np.arange(n * fine) * dt
     w = CubicSpline(grid, motion.velocity)
-    kp = LOOP / (model.gain * dt)
+    kp = POLICY.inversion_gain / (model.gain * dt)
     wanted = w(np.minimum(at, grid[-1]))
-    # The loop follows late by dt/LOOP, so the command leads by as much.
-    command = wanted + dt / LOOP * w(np.minimum(at, grid[-1]), 1)
+    # The loop follows late by dt/`inversion_gain`, so the command leads by as much.
+    command = wanted + dt / POLICY.inversion_gain * w(np.minimum(at, grid[-1]), 1)
     position = CubicSpline(grid, motion.position)(np.minimum(at, grid[-1]))
     state = np.zeros(mechanism.order + 2 * any(e.row.place == "plant" for e in mechanism.effects) + 1)
     state[0] = motion.velocity[0]
-    loop = PI(kp=kp, ki=INTEGRAL * kp / dt)
+    loop = PI(kp=kp, ki=POLICY.inversion_integral * kp / dt)
     with np.errstate(all="ignore"):
         for _ in range(POLICY.led):
             led = run(mechanism, Record(dt, command=command, velocity=command, position=position), loop, state)
