@@ -6,21 +6,21 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from gaident.axis import Text, message_of, say
+from gaident.axis import Text, message_of, percent, say
 from gaident.control.pi import PI
 from gaident.data.record import Record
 from gaident.errors import GaidentError
 from gaident.identification.identify import identify
 from gaident.models.drive_torque import torque_blocks
 from gaident.models.model import Model
+from gaident.policy.table import POLICY
 from gaident.results.identification import Identification
 
 __all__ = ["linear_of_part"]
 
 SEEN = (
-    "The samples that are fitted where the others are held out identify no linear model by themselves ({}). The linear model "
-    "of the free run is then the one of all samples. It has seen what is held out, so its error may be smaller than that of a "
-    "model that has not, and the error may fall by more than these figures say."
+    "The first {} of each record identify no linear model by themselves ({}). The linear model of these figures is that of the "
+    "whole record, the held-out part included, so its error is too small."
 )
 
 
@@ -36,8 +36,8 @@ def linear_of_part(
         return idn.model, ()
     first = [r[:count] for r, count in zip(records, part, strict=True)]
     if not any(np.any(u) for r in first for _, u, _ in torque_blocks(r, pi)):
-        return idn.model, (say(SEEN, say("no {torque} drives them")),)
+        return idn.model, (say(SEEN, percent(POLICY.fitted_share), say("no {torque} drives them")),)
     try:
         return identify(first, pi, space=idn.space, settings=idn.settings, seed=idn.seed).model, ()
     except GaidentError as error:
-        return idn.model, (say(SEEN, message_of(error)),)
+        return idn.model, (say(SEEN, percent(POLICY.fitted_share), message_of(error)),)

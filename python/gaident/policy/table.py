@@ -281,6 +281,7 @@ class Decisions:
     )
     fastest_lag: float = loop(0.05, "samples", "time constant at least of that lag: no log tells a shorter one from none", LAGS)
     lag_said: float = loop(0.75, "samples", "from which a lag of an open loop's log is said; a sampled torque's is 0.5", SHIFTED)
+    lag_whole: float = loop(0.25, "samples", "from whole samples, of a motion before its torque: then the log is wrong", SHIFTED)
     observer_share: float = loop(0.3, "1", "of the controller that holds a model with a gap near its record", DRIVES)
     kept_correlation: float = loop(0.5, "1", "of the correlations of a controller's numbers from a slow log", SLOWER)
     slope_reach: float = loop(

@@ -7,6 +7,7 @@ import textwrap
 from collections.abc import Mapping
 
 from gaident.axis import Text, called, identifier_words, joined, said, say, unit, velocity_unit, word
+from gaident.models.model import Model
 from gaident.policy.table import POLICY
 from gaident.results.diagnosis import Diagnosis
 from gaident.results.estimate import Estimate, of_axis
@@ -313,8 +314,16 @@ def _mechanics(dia: Diagnosis, axis: str) -> list[str]:
     if any(e.std is not None and e.std > 0.0 for e in dia.mechanics.values()):
         lines.append(f"  +- {SPREAD}")
     if "resonance" not in dia.mechanics and len(dia.model.poles) > 1:
-        lines.append("  a second pair of poles that does not swing: no resonance of a shaft")
+        lines.append(f"  {_other_pair(dia.model)}")
     return lines
+
+
+def _other_pair(model: Model) -> str:
+    """What the poles beside the slowest are where no shaft is reported."""
+    swinging = [abs(p) / math.tau for p in model.poles if p.imag > 0.0 and -p.real < POLICY.swing_damping * abs(p)]
+    if not swinging:
+        return "a second pair of poles that does not swing: no resonance of a shaft"
+    return f"a pair of poles at {number(min(swinging), 3)} Hz that is no shaft's: it stands for something else"
 
 
 def mechanical_name(name: str, axis: str) -> str:

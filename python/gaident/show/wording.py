@@ -23,7 +23,7 @@ GAINS = {"kp", "ki"}
 SPREAD = "is the spread that noise alone makes; what the model gets wrong may move a value further."
 """Of a standard deviation; stands behind its sign."""
 NOT_AS_GIVEN = {
-    "integration_rule": "the integration rule of the controller is not given",
+    "integration_rule": "the controller has another integration rule than the one given or assumed",
     "other_gains": "the controller has other gains than the given ones",
 }
 """Finding -> what differs in the controller itself: the model of the axis lacks nothing by it."""
@@ -60,8 +60,10 @@ def free_run_words(run: Fitness, written: Callable[[float], str] = number) -> tu
 
 def step_words(gain: float) -> str:
     """By how much an effect lets the error of the free run fall, of what was left before it: "83 %"."""
-    if gain < -1e3:  # no decision: how a number is printed
+    if not gain > -1e6:  # no number where one run diverges after another  # no decision: how a number is printed
         return "nothing (the free run diverges)"
+    if gain < -1e3:  # no decision: how a number is printed
+        return "nothing (the free run is worse by far)"
     share = round(100.0 * gain)
     return f"{share} %" if share >= 0 else f"nothing (the free run is worse: its error grows by {-share} %)"
 

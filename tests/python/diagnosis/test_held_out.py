@@ -192,7 +192,7 @@ def test_a_linear_model_that_has_seen_what_is_held_out_is_said_to_have() -> None
     dia = ga.diagnose(coasting())
     said = [n for n in dia.notes if "identify no linear model by themselves" in n]
     assert dia.held_out.startswith("the last 30 % of the record") and len(said) == 1, dia.notes
-    assert "(no torque drives them)" in said[0] and "It has seen what is held out" in said[0]
+    assert "(no torque drives them)" in said[0] and "the held-out part included" in said[0]
     assert "(no force drives them)" in said[0].linear  # type: ignore[attr-defined]
     # The model of all samples, not one that nothing determines.
     assert dia.before.rmse < 5.0

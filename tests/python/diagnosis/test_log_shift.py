@@ -158,11 +158,11 @@ def test_a_torque_that_is_sampled_stands_half_a_sample_late_and_nothing_is_said_
         assert aligned([rec], [], None).notes == () != aligned([rec.shifted(torque=1)], [], None).notes
 
 
-def test_in_open_loop_it_is_said_and_nothing_is_moved() -> None:
+def test_in_open_loop_a_motion_before_its_torque_is_the_log_s_and_a_delay_is_only_said() -> None:
     rec = rig(ELASTIC, STEPS, FRICTION)
     assert aligned([rec], [], None).notes == ()
     moves, found = looked_at(rec.shifted(torque=1), None)
-    assert moves == {} and "which no axis does" in found.notes[0] and "shift torque=-1" in found.notes[0]
+    assert moves == {"torque": -1} and "which no axis does" in found.notes[0] and "was moved by -1" in found.notes[0]
     for late in (rec.shifted(torque=-1), rig(ELASTIC, STEPS, DELAY)):
         moves, found = looked_at(late, None)
         assert (
@@ -170,6 +170,14 @@ def test_in_open_loop_it_is_said_and_nothing_is_moved() -> None:
         )
         # A torque that follows from a controller stands on the lines of what it read.
         assert aligned([late], [], None, follows=True).notes == ()
+
+
+def test_a_torque_that_was_logged_late_in_open_loop_is_moved_and_the_inertia_is_right() -> None:
+    rec = rig(RIGID, STEPS, FRICTION).shifted(torque=1).with_channels(command=None)
+    dia = ga.diagnose(rec)
+    assert dia.log_shifts == {rec.digest: {"torque": -1}} and dia.records == (rec,)
+    assert [f.effect for f in dia.causes] == ["coulomb_friction"], dia.summary()
+    assert dia.mechanics["inertia"].value == pytest.approx(RIGID.J, rel=0.01)
 
 
 def test_the_diagnosis_names_the_cause_behind_a_shift_and_speaks_of_the_records_that_it_was_given(tmp_path: Path) -> None:

@@ -93,3 +93,6 @@ def test_what_a_measured_torque_does_between_the_lines_is_no_shaft(seed: int) ->
     assert "stiffness" not in dia.mechanics, dia.summary()
     assert dia.mechanics["inertia"].value == pytest.approx(inertia, rel=3e-3)
     assert [f.effect for f in dia.causes] == ["coulomb_friction"]
+    assert any("one of a shaft above 175 Hz would not have been named" in words for words in dia.one_sided.values()), (
+        dia.one_sided
+    )

@@ -22,7 +22,7 @@ from gaident.errors import GaidentError, RecordError, SettingsError
 from gaident.results.diagnosis import Comparison, Fitness
 from gaident.results.finding import Finding
 from gaident.show.report.diagnosis import headline
-from gaident.show.wording import certainty
+from gaident.show.wording import certainty, step_words
 from places import GOLDEN
 
 SUMMARY = GOLDEN / "diagnosis.txt"
@@ -245,7 +245,11 @@ def test_a_parameter_that_moved_by_more_than_ten_times_says_how_many() -> None:
 @pytest.mark.parametrize(
     ("effect", "parameters", "words"),
     [
-        ("integration_rule", {}, "The integration rule of the controller is not given; with it nothing significant is left."),
+        (
+            "integration_rule",
+            {},
+            "The controller has another integration rule than the one given or assumed; with it nothing significant is left.",
+        ),
         (
             "other_gains",
             {"kp": ga.Estimate(0.52, 1e-4, "N m s/rad"), "ki": ga.Estimate(20.7, 0.1, "N m/rad")},
@@ -332,9 +336,20 @@ def test_figures_of_chance_are_given_as_what_they_are() -> None:
 def test_a_pair_that_does_not_swing_is_no_resonance() -> None:
     result = fake()
     result.mechanics = {name: result.mechanics[name] for name in ("inertia", "viscous_friction")}
+    result.model = ga.Model(gain=500.0, poles=[-3.0, -300.0, -900.0], zeros=[-400.0, -700.0])
     text = summary(result)
     assert "resonance  " not in text and "damping ratio" not in text
     assert "a second pair of poles that does not swing" in text
+    # One that swings, and that a shaft was not found in, is not said to be at rest.
+    pole = 2.0 * np.pi * 194.0 * complex(-0.016, math.sqrt(1.0 - 0.016**2))
+    result.model = ga.Model(gain=500.0, poles=[-3.0, pole, pole.conjugate()], zeros=[0.9 * pole, 0.9 * pole.conjugate()])
+    assert "a pair of poles at 194 Hz that is no shaft's" in summary(result)
+
+
+def test_a_free_run_that_diverges_twice_has_no_share() -> None:
+    assert step_words(math.nan) == "nothing (the free run diverges)"
+    assert step_words(-2000.0) == "nothing (the free run is worse by far)"
+    assert step_words(0.834) == "83 %"
 
 
 def test_the_file_holds_the_whole_result(dia: ga.Diagnosis, tmp_path: Path) -> None:

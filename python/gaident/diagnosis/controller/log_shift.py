@@ -76,7 +76,7 @@ def aligned(records: Sequence[Record], validation: Sequence[Record], controller:
     def one(rec: Record) -> Record:
         moves, note = _of_law(rec, controller)
         if controller is None and not follows:
-            note = _of_motion(rec)
+            moves, note = _of_motion(rec)
         if note:
             name = f"{rec.name}: " if len(records) + len(validation) > 1 and rec.name else ""
             notes[joined("", (name, note))] = None
@@ -197,12 +197,26 @@ def _measured_note(b: int, lag: TorqueLag | None) -> Text:
     return say(text, _samples(b), where, f"shift torque={-b}")
 
 
-def _of_motion(rec: Record) -> Text:
-    """What the motion says of a torque in open loop, where no law proves anything: a note, "" where there is nothing to say."""
+def _of_motion(rec: Record) -> tuple[Mapping[str, int], Text]:
+    """(channel -> samples by which it is moved, note) of a torque in open loop, where no law of a controller proves anything.
+
+    A motion that comes whole samples before its torque is the log's: no axis does that, and there is nothing to find in it.
+    By a part of a sample it is a filter of the torque, or a torque that goes on between the lines; a motion behind its torque
+    may be a delay of the drive. Neither is moved.
+    """
     lag = torque_lag(rec)
     if lag is None or abs(lag.lag) - POLICY.contradiction * lag.std < POLICY.lag_seen or abs(lag.lag) < POLICY.lag_said:
-        return Text("")
-    remedy = f"where you know that it is the log, read it with shift torque={-round(lag.lag)}. Nothing was moved."
+        return {}, Text("")
+    whole = round(lag.lag)
+    apart = abs(lag.lag - whole)
+    told = apart + POLICY.contradiction * lag.std < 0.5  # no decision: from a half sample
+    if lag.lag > 0.0 and apart < POLICY.lag_whole and told:
+        text = (
+            "The motion comes {} before the logged {torque} that makes it, which no axis does: the log wrote the {torque} {} "
+            "late (or the velocity early). The {torque} was moved by {:+d}, and everything below is of that."
+        )
+        return {"torque": -whole}, say(text, _samples(lag.lag), _samples(whole), -whole)
+    remedy = f"where you know that it is the log, read it with shift torque={-whole}. Nothing was moved."
     if lag.lag > 0.0:
         text = (
             "The motion comes {} before the logged {torque} that makes it, which no axis does: the log wrote the {torque} late "
@@ -213,4 +227,4 @@ def _of_motion(rec: Record) -> Text:
             "The motion follows the logged {torque} by {} more than an axis needs: a delay of the drive or of the velocity's "
             "sensor, or a log that wrote the {torque} early; without a controller the data cannot tell; {}"
         )
-    return say(text, _samples(lag.lag), remedy)
+    return {}, say(text, _samples(lag.lag), remedy)

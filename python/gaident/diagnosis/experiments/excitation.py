@@ -152,7 +152,8 @@ def _motion(rec: Record, controller: Controller | None, top: float) -> SeenMotio
     torque_floor = max(POLICY.above_noise * noise_std(u), POLICY.still * float(np.abs(u).max()), TINY)
     repeated = any(abs(a - b) < POLICY.apart * top for a in early for b in late if a)
     shape = moving, tuple(held), tuple(jumps), repeated
-    return SeenMotion(rec.dt, w, smooth, u, position, command, floor, torque_floor, *shape, rec.torque is not None)
+    measured = rec.torque is not None and rec.torque_is == MEASURED
+    return SeenMotion(rec.dt, w, smooth, u, position, command, floor, torque_floor, *shape, rec.torque is not None, measured)
 
 
 def _smoothed(x: Vector, width: int) -> Vector:

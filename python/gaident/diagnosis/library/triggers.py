@@ -29,7 +29,8 @@ class SeenMotion:
 
     velocity as measured and smooth [rad/s], torque [N m], position [rad], command [rad/s] or None; floors: what is taken for
     noise around zero; moving: |smooth| above its floor; held: speeds held; jumps: sizes of command jumps; repeated: a speed held
-    in the first third is held again in the last; logged: whether the torque is that of the log.
+    in the first third is held again in the last; logged: whether the torque is that of the log;
+    measured: whether it was measured.
     """
 
     dt: float
@@ -45,6 +46,7 @@ class SeenMotion:
     jumps: tuple[float, ...]
     repeated: bool
     logged: bool = True
+    measured: bool = False
 
 
 @dataclass(frozen=True, eq=False)
@@ -289,8 +291,15 @@ def slope_beyond(s: Motions) -> Text | None:
 def resonance_beyond(s: Motions) -> Text:
     """Resonances that are too fast for the sampling, of a shaft or another one."""
     dt = max(m.dt for m in s.records)
+    highest = 0.5 / dt  # no decision: half the sampling frequency
+    if any(m.measured for m in s.records):
+        text = (
+            "one of a shaft above {:.3g} Hz would not have been named, as a measured {torque} is not known between the lines of "
+            "the log, {:.3g} ms apart; none above {:.3g} Hz would have shown"
+        )
+        return say(text, POLICY.seen_measured * highest, 1e3 * dt, POLICY.seen_band * highest)
     text = "one above {:.3g} Hz would not have shown, of a shaft or another: the log has a line every {:.3g} ms"
-    return say(text, POLICY.seen_band * 0.5 / dt, 1e3 * dt)  # no decision: half the sampling frequency
+    return say(text, POLICY.seen_band * highest, 1e3 * dt)
 
 
 def orders_beyond(s: Motions) -> Text | None:
