@@ -89,6 +89,13 @@ class Decisions:
     detail_level: float = gain(
         0.005, "probability", "level of the likelihood-ratio test of an effect against a simpler one in it (Wilks 1938)", DRIVES
     )
+    simulation_exact: float = gain(
+        2e-4,
+        "1",
+        "of what all effects change in the velocity: a generalisation or a spring that changes less is not seen through the "
+        "simulation's own error, which is 0.02 to 0.65 % of it (docs/effects.md)",
+        DRIVES,
+    )
     swap: float = gain(2.0, "BIC units", "by which a rival has to be better to take an effect's place", DRIVES)
     most_effects: int = gain(4, "1", "effects in one model at most", DRIVES)
     harm: float = gain(0.02, "1", "part of the held-out error that an effect may add before it is refused", REAL)

@@ -450,6 +450,30 @@ def test_a_generalisation_is_worth_two_penalties() -> None:
         assert bench.space.worth(bench.fit(GENERAL), bench.fit(LEVEL)) is counts
 
 
+def test_a_generalisation_that_changes_less_than_the_simulation_is_exact_to_is_none() -> None:
+    """However significant it is: the error of a simulation is a share of what the effects change."""
+    for share, counts in ((0.2, False), (5.0, True)):
+        detail = share * POLICY.simulation_exact * 5.0
+        bench = Bench({"level": (5.0,)}, extra=detail * wave(13.7), noise=1e-5, allowed=(A, LEVEL, GENERAL))
+        level, general = bench.fit(LEVEL), bench.fit(GENERAL)
+        assert bench.space.score(general) < bench.space.score(level) - 100.0, "significant in either case"
+        assert bench.space.worth(general, level) is counts
+        rivals = [r.effect for r in rivals_of(bench.space, level, "level")[1]]
+        assert ("general" in rivals) is counts
+
+
+def test_what_effects_change_is_asked_of_a_spring_too(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A spring is no effect, but it is one more of what a simulation may only seem to lack."""
+    bench = Bench({"level": (5.0,)}, noise=1e-5)
+    level = bench.fit(LEVEL)
+    sprung = replace(level.parameters)
+    monkeypatch.setattr(Parameterisation, "on_a_spring", property(lambda p: p is sprung))
+    hypothesis = Hypothesis(sprung, level.predictor)
+    with_spring = replace(level, hypothesis=hypothesis, x=level.x + np.array([1e-4, 0.0, 0.0]), bic=level.bic - 1000.0)
+    assert bench.space.score(with_spring) < bench.space.score(level)
+    assert not bench.space.worth(with_spring, level)
+
+
 def test_the_neutral_case_of_a_generalisation_scores_as_the_simpler_effect() -> None:
     bench = Bench({"level": (0.5,)})
     level, general = bench.fit(LEVEL), bench.fit(GENERAL)
@@ -733,6 +757,15 @@ def test_search_goes_by_all_starts_and_globally_and_never_makes_worse() -> None:
     beyond = Bench(extra=0.5 * np.sin(40.0 * S**2), plain=True)
     fit = beyond.fit(VALLEY)
     assert beyond.space.search(fit).bic <= fit.bic
+
+
+def test_search_ends_under_the_predictor_that_shows_most(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A model that grew in closed loop comes out of it where the record shows more without: here it drifts in the loop only."""
+    bench = Bench({"a": (0.5,)}, loop=True, noise=1e-3)
+    monkeypatch.setattr(type(bench.space), "with_best_resonance", lambda self, fit: fit)
+    inside = bench.fit(A, closed=True)
+    found = bench.space.search(inside)
+    assert not found.predictor.closed and found.bic < inside.bic - 100.0
 
 
 def test_valleys_are_searched_beside_a_linear_model() -> None:

@@ -50,6 +50,14 @@ def _depth(term: Term) -> int:
     return 1 + max((_depth(LIBRARY[name]) for name in term.nested), default=0)
 
 
+def _linear_part(fit: Fit) -> tuple[Hypothesis, Vector]:
+    """A model without its effects, at the same values."""
+    hypothesis, x = fit.hypothesis, fit.x
+    for effect in fit.effects:
+        x, hypothesis = hypothesis.parameters.removed(x, effect), hypothesis.without(effect)
+    return hypothesis, x
+
+
 @dataclass(frozen=True, eq=False)
 class ModelSpace:
     """The models that can be made of a library over one objective, and the moves between them."""
@@ -150,9 +158,26 @@ class ModelSpace:
         if not self.score(fuller) < self.score(simpler):
             return False
         more = [t for t in fuller.parameters.terms if t.name not in simpler.effects]
-        if any(set(t.nested) & set(simpler.effects) for t in more) and not self.in_both_loops(simpler, fuller):
+        if any(set(t.nested) & set(simpler.effects) for t in more) and not self.generalises(simpler, fuller):
+            return False
+        if fuller.parameters.on_a_spring and not (simpler.parameters.on_a_spring or self.beyond_simulation(simpler, fuller)):
             return False
         return self.material(simpler, fuller)
+
+    def generalises(self, simpler: Fit, fuller: Fit) -> bool:
+        """Whether what a generalisation adds is that of the drive: more than the simulation is exact to, and in both loops."""
+        return self.beyond_simulation(simpler, fuller) and self.in_both_loops(simpler, fuller)
+
+    def beyond_simulation(self, simpler: Fit, fuller: Fit) -> bool:
+        """Whether a generalisation, or a spring, changes the velocity by more than the simulation is exact to.
+
+        The simulation is exact to a share of what all effects change, with and without them (docs/effects.md).
+        """
+        with_effects, refined = self.objective.error(fuller), self.objective.error(simpler)
+        hypothesis, x = _linear_part(fuller)
+        linear = self.objective.error(replace(fuller, hypothesis=hypothesis, x=x))
+        changed = float(np.sum((linear - with_effects) ** 2))
+        return bool(np.sum((refined - with_effects) ** 2) > self.policy.simulation_exact**2 * changed)
 
     def under_predictor_of(self, fit: Fit, other: Fit) -> Fit:
         """The fit under the other's predictor, where that is better: models are compared under the same predictors."""
@@ -297,10 +322,7 @@ class ModelSpace:
 
     def bare(self, fit: Fit) -> Fit:
         """The linear part of a model, fitted without its effects."""
-        hypothesis, x = fit.hypothesis, fit.x
-        for e in fit.effects:
-            x, hypothesis = hypothesis.parameters.removed(x, e), hypothesis.without(e)
-        return self.refitted(hypothesis, x)
+        return self.refitted(*_linear_part(fit))
 
     def canonical(self, fit: Fit) -> Fit:
         """One mass with an extra resonance is a drive of two masses: part of the linear model, not an effect."""

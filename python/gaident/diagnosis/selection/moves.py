@@ -335,14 +335,17 @@ class Moves(SideMoves):
     # The same model again.
 
     def search(self, fit: Fit) -> Fit:
-        """Where more than noise is left: every effect from all of its starts, multimodal ones by a global search nearby."""
+        """Where more than noise is left: every effect from all of its starts, multimodal ones by a global search nearby.
+
+        Then under the best predictor: the one that a model grew under was chosen beside other values.
+        """
         for term in fit.parameters.terms[::-1]:
             if self.quiet(fit):
                 break
             fit = min((fit, self.restarted(fit, term)), key=lambda f: f.bic)
             if term.multimodal and not self.quiet(fit):
                 fit = min((fit, self.evolved(fit)), key=lambda f: f.bic)
-        return self.with_best_resonance(fit)
+        return self.with_best_resonance(self.under_best_predictor(fit) if fit.effects else fit)
 
     def with_best_resonance(self, fit: Fit) -> Fit:
         """The fit or, where these score better, two masses with another resonance.

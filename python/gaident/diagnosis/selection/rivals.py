@@ -54,7 +54,7 @@ def rivals_of(space: Moves, final: Fit, effect: str, equivalent: Collection[str]
             gained = cost_of(more, space.objective.information) - behind  # likelihood ratio, 2 ln
             if gained < chi_square_bound(more, space.policy.detail_level):
                 continue
-            if behind < -space.penalty and not space.in_both_loops(final, f):
+            if not space.beyond_simulation(final, f) or (behind < -space.penalty and not space.in_both_loops(final, f)):
                 continue
         if behind < space.margin:
             found.append(Replacement(other.name, behind, f))
