@@ -97,11 +97,37 @@ def between_lines(line: Vector, every: int) -> Vector:
     """A velocity command between the lines of its log: on a ramp it goes straight, at a jump it is held until the next line.
 
     An interval belongs to a ramp where the change over it is at most twice that over the interval before or after.
+    Where a ramp begins, ends or bends between two lines, the ramp before goes over into the one after where they meet:
+
+        x0 + b t = x1 - a (1 - t),   t = (x1 - x0 - a)/(b - a)
+
+    x0, x1 are the lines of the interval, b and a the changes over the intervals before and after, t from 0 to 1.
     """
     if every == 1:
         return np.ascontiguousarray(line, dtype=np.float64)
     steps = np.append(_ramps(line), 0.0)
-    return (line[:, None] + steps[:, None] * (np.arange(every) / every)).ravel()
+    t = np.arange(every) / every
+    made = line[:, None] + steps[:, None] * t
+    at, before, after = _bends(np.diff(line))
+    meeting = (line[at + 1] - line[at] - after) / (before - after)
+    rise, fall = line[at, None] + before[:, None] * t, line[at + 1, None] - after[:, None] * (1.0 - t)
+    made[at] = np.where(t < meeting[:, None], rise, fall)
+    return np.asarray(made).ravel()
+
+
+def _bends(steps: Vector) -> tuple[NDArray[np.intp], Vector, Vector]:
+    """Intervals within which one ramp goes over into another one, and the changes over the intervals before and after them.
+
+    Each of the ramps goes straight over two intervals, and the change over the interval is between theirs.
+    """
+    if len(steps) < 5:  # no decision: two intervals before and two after
+        return np.zeros(0, dtype=np.intp), np.zeros(0), np.zeros(0)
+    earlier, before, here, after, later = np.lib.stride_tricks.sliding_window_view(steps, 5).T  # no decision: the same
+    bend = np.abs(after - before)
+    straight = np.maximum(np.abs(before - earlier), np.abs(later - after)) <= POLICY.ramp_straight * bend
+    between = (np.minimum(before, after) < here) & (here < np.maximum(before, after))
+    (at,) = np.nonzero(straight & between)
+    return at + 2, before[at], after[at]  # no decision: the third of five intervals
 
 
 def _ramps(line: Vector) -> Vector:

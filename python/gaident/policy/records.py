@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from gaident.policy.declared import DRIVES, ENCODER, LOOP, REAL, REGRESSION, SAMPLED, SHORT, SUCCESS, record
+from gaident.policy.declared import DRIVES, ENCODER, LOOP, REAL, REGRESSION, SAMPLED, SHORT, SLOWER, SUCCESS, record
 
 __all__ = ["Records"]
 
@@ -48,6 +48,9 @@ class Records:
     apart: float = record(0.05, "1", "of the highest speed, by which two speeds or jumps differ", DRIVES)
     slow: float = record(0.1, "1", "of the highest speed or torque: below, it is a slow or a small one", DRIVES)
     held_samples: int = record(20, "samples", "for which a speed is held at least", DRIVES)
+    ramp_straight: float = record(
+        0.1, "1", "of the bend between two ramps of a slow log's command, by which either may miss a straight line", SLOWER
+    )
     no_ramp: float = record(0.35, "1", "of the band of a held speed, by which its halves differ at most; on a ramp 0.5", DRIVES)
     seen_turn: float = record(0.75, "1", "of a period, that a record turns at least to show what returns once in it", DRIVES)
     seen_periods: float = record(2.0, "periods", "in the travel, of what returns more often; less is any curve", DRIVES)

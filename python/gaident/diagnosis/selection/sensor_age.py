@@ -103,7 +103,8 @@ def searched(
     going_on = (-HALF,) if every == 1 and controller is not None and data.torque_logged and not data.loop_follows else ()
     if going_on:
         objective = Objective(data.aged(0.0, going_on), objective.weight, counter=objective.counter)
-    lines = encoder_lines(data.velocity, data.dt / every, TURN if data.axis == "rotary" else 1.0)
+    read = data.velocity[objective.weight > 0.0]  # what stands in an outlier's place is on no lattice
+    lines = encoder_lines(read, data.dt / every, TURN if data.axis == "rotary" else 1.0)
     older = Objective(data.aged(HALF / every, (0.0, *going_on)), objective.weight, counter=objective.counter)
     age = 1e3 * HALF * data.dt / every
     if lines and not _score(objective, scales, model) < _score(older, scales, model) - POLICY.rival_margin:
@@ -116,7 +117,7 @@ def searched(
         return search(older, most), [say(text, lines, each, age)]
     found = search(objective, most)
     in_series = any(t.in_series for t in found.final.parameters.terms)
-    step = encoder_step(data.velocity, data.axis == "linear") if in_series else 0.0
+    step = encoder_step(read, data.axis == "linear") if in_series else 0.0
     if not step > 0.0:
         return found, []
     # First whether fewer effects may do, unless the model itself is better so; then what the whole search ends with.
