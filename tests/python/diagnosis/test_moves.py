@@ -724,19 +724,22 @@ def test_deepened_searches_near_impacts_until_nothing_more_is_gained(monkeypatch
     assert found.x[-1] == pytest.approx(0.52, abs=2e-3) and bench.space.score(found) < bench.space.score(stuck)
     without = bench.fit(VALLEY)
     assert bench.space.deepened(without) is without, "no impacts"
-    # Each search gains twice the margin, until there is no more of it; a search that finds worse changes nothing.
+    # It ends after two draws in a row that gain less than the margin; a search that finds worse changes nothing.
     margin, asked = bench.space.margin, []
-    gains = iter([2.0 * margin, 2.0 * margin, 0.5 * margin])
+    gains = iter([2.0 * margin, 2.0 * margin, 0.5 * margin, 3.0 * margin, -margin, 0.2 * margin])
 
-    def evolved(space: object, fit: Fit) -> Fit:
-        asked.append(fit)
+    def evolved(space: object, fit: Fit, draw: int) -> Fit:
+        asked.append(draw)
         return replace(fit, bic=fit.bic - next(gains))
 
     monkeypatch.setattr(type(bench.space), "evolved", evolved)
     monkeypatch.setattr(type(bench.space), "refitted", lambda space, hypothesis, x, iterations=0: replace(stuck, bic=1e9))
-    assert bench.space.deepened(stuck).bic == pytest.approx(stuck.bic - 4.5 * margin) and len(asked) == 3
-    gains = iter([-5.0 * margin])
+    assert bench.space.deepened(stuck).bic == pytest.approx(stuck.bic - 7.7 * margin) and asked == [0, 1, 2, 3, 4, 5]
+    gains = iter([-5.0 * margin, -5.0 * margin])
     assert bench.space.deepened(stuck) is stuck
+    monkeypatch.setattr(type(bench.space), "quiet", lambda space, fit: True)
+    gains = iter([-5.0 * margin])
+    assert bench.space.deepened(stuck) is stuck, "what leaves noise is searched once"
 
 
 def test_demoted_takes_a_linear_model_too() -> None:

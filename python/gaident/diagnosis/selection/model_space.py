@@ -23,6 +23,7 @@ from gaident.diagnosis.selection.mechanisms import as_two_masses, resonance, swi
 from gaident.estimation import least_squares as ls
 from gaident.estimation.criterion import cost_of, effective_samples
 from gaident.estimation.dataset import DataSet
+from gaident.estimation.global_search import evolved
 from gaident.estimation.noise_model import WHITE
 from gaident.estimation.objective import Fit, Hypothesis, Innovations, Objective, OutputErrors
 from gaident.estimation.prediction import ClosedLoop, ObserverLoop, OpenLoop, Predictor
@@ -331,25 +332,27 @@ class ModelSpace:
         hypothesis, x = as_two_masses(fit)
         return self.continued(hypothesis, fit, x)
 
-    def evolved(self, fit: Fit) -> Fit:
-        """A global search nearby, in the loop where there is one."""
+    def evolved(self, fit: Fit, draw: int = 0) -> Fit:
+        """A global search nearby, in the loop where there is one; draw: of several from the same fit."""
         predictor = self.closed(fit.predictor) if self.data.fits_in_loop else fit.predictor
         start = replace(fit, hypothesis=fit.hypothesis.driven_by(predictor))
-        key = "evolved", start.key, self.policy.evolution
-        return self.objective.once(key, lambda: self.finished(ls.evolved(self.objective, start, self.policy.evolution)))
+        key = "evolved", start.key, self.policy.evolution, draw
+        return self.objective.once(key, lambda: self.finished(evolved(self.objective, start, self.policy.evolution, draw)))
 
     def deepened(self, fit: Fit) -> Fit:
-        """A model with impacts, searched globally nearby until that brings no more.
+        """A model with impacts, searched globally nearby until further draws bring no more.
 
         The cost has a local minimum for each number of impacts, also where the errors are as small as the noise of the velocity.
         """
         if not any(t.impacts for t in fit.parameters.terms):
             return fit
-        for _ in range(self.policy.deepenings):
-            found = self.evolved(fit)
+        in_vain = 0
+        for draw in range(self.policy.deepenings):
+            found = self.evolved(fit, draw)
             found = min((found, self.refitted(found.hypothesis, found.x, self.policy.long)), key=self.score)
             gained = self.score(fit) - self.score(found)
             fit = found if gained > 0.0 else fit
-            if gained <= self.margin:
+            in_vain = 0 if gained > self.margin else in_vain + 1
+            if in_vain == self.policy.draws_in_vain or (in_vain and self.quiet(fit)):
                 break
         return fit
