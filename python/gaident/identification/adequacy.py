@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from gaident.identification.noise import Autoregression, chi2_tail, ljung_box_of
+from gaident.identification.noise import Autoregression, ljung_box_of
 from gaident.policy.table import POLICY
 from gaident.results.adequacy import Adequacy
 
@@ -105,8 +105,14 @@ def independence_p(sums: Vector, own: int, samples: int) -> float:
     dof = samples - len(basis) - m
     if dof < 1 or not left > 0.0:
         return 1.0 if not explained > 0.0 else 0.0
-    # F(m, dof) by its chi2 limit with the finite-sample correction dof ln(1 + m F / dof).
-    return chi2_tail((dof + 0.5 * m) * math.log1p(explained / left), m)
+    return _f_tail((explained / m) / (left / dof), m, dof)
+
+
+def _f_tail(x: float, m: int, dof: int) -> float:
+    """P(F > x) for m and dof degrees of freedom."""
+    from scipy.special import fdtrc
+
+    return float(fdtrc(m, dof, x))
 
 
 def _orthonormal(gram: Vector) -> Vector:
