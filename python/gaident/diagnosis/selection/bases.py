@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -13,6 +13,7 @@ from gaident.diagnosis.library.sides import name_of
 from gaident.diagnosis.library.terms import LIBRARY, of_inverse_dynamics
 from gaident.diagnosis.selection.attribution import friction_shown
 from gaident.diagnosis.selection.mechanisms import is_mechanism, one_mass, reduced, resonant, rigid, swings
+from gaident.diagnosis.selection.model_space import Grown
 from gaident.diagnosis.selection.moves import Moves
 from gaident.diagnosis.selection.score_test import ScoreTest
 from gaident.errors import GaidentError, RecordError, SettingsError
@@ -53,6 +54,7 @@ class Task:
     most: int = POLICY.most_effects
     shown: frozenset[str] = frozenset()
     rigid_below: float = 0.0
+    grown: Grown = field(default_factory=Grown)
 
     @property
     def data(self) -> DataSet:
@@ -60,7 +62,7 @@ class Task:
 
     def space(self) -> Moves:
         policy = replace(POLICY, most_effects=self.most)
-        return Moves(self.objective, self.allowed, self.note, policy, self.shown, self.rigid_below)
+        return Moves(self.objective, self.allowed, self.note, policy, self.shown, self.rigid_below, self.grown)
 
     def under(self, family: Innovations | OutputErrors) -> Task:
         return replace(self, objective=self.objective.under(family))

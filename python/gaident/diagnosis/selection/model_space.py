@@ -10,8 +10,9 @@ This is the one decision of the search; its numbers stand in the policy.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Hashable, Iterable
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Hashable, Iterable, Sequence
+from dataclasses import dataclass, field, replace
+from weakref import WeakKeyDictionary
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,7 +30,7 @@ from gaident.estimation.prediction import ClosedLoop, ObserverLoop, OpenLoop, Pr
 from gaident.estimation.term import Term
 from gaident.policy.table import POLICY, Policy
 
-__all__ = ["ModelSpace", "representative", "words"]
+__all__ = ["Grown", "ModelSpace", "representative", "words"]
 
 Vector = NDArray[np.float64]
 
@@ -50,6 +51,21 @@ def _depth(term: Term) -> int:
     return 1 + max((_depth(LIBRARY[name]) for name in term.nested), default=0)
 
 
+class Grown:
+    """The fits from which a search has grown others, of each model over each objective, in the order in which it did."""
+
+    def __init__(self) -> None:
+        self._fits: WeakKeyDictionary[Objective, dict[Hashable, list[Fit]]] = WeakKeyDictionary()
+
+    def note(self, objective: Objective, model: Hashable, fit: Fit) -> None:
+        """One more fit of a model."""
+        self._fits.setdefault(objective, {}).setdefault(model, []).append(fit)
+
+    def of(self, objective: Objective, model: Hashable) -> Sequence[Fit]:
+        """Those of a model."""
+        return self._fits.get(objective, {}).get(model, ())
+
+
 @dataclass(frozen=True, eq=False)
 class ModelSpace:
     """The models that can be made of a library over one objective, and the moves between them."""
@@ -60,6 +76,7 @@ class ModelSpace:
     policy: Policy = POLICY
     shown: frozenset[str] = frozenset()  # families of effects that the records show by themselves
     rigid_below: float = 0.0  # rad/s, below which the records show one rigid body
+    grown: Grown = field(default_factory=Grown)
 
     # What a model is worth.
 

@@ -20,7 +20,7 @@ Whether an effect is added is one decision, `ModelSpace.worth`; a search of the 
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Hashable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -90,17 +90,17 @@ class Moves(SideMoves):
         if len(now.effects) >= self.policy.most_effects:
             return []
         key = "add", now.key, self.allowed
-        self._grown(now).append(now)
+        self.grown.note(self.objective, self._model(now), now)
         return self.objective.once(key, lambda: self._best(now, [*self.ground(now), *self.with_a_load(now), *self._add(now)]))
 
     def known(self, fit: Fit) -> Fit:
         """A fit of the same model that was grown already, unless it is worse by more than `swap`: what it grows to is known."""
-        near = [f for f in self._grown(fit) if f.bic < fit.bic + self.policy.swap]
+        near = [f for f in self.grown.of(self.objective, self._model(fit)) if f.bic < fit.bic + self.policy.swap]
         return min(near, key=lambda f: f.bic) if near else fit
 
-    def _grown(self, fit: Fit) -> list[Fit]:
-        """The fits of the same model over this objective that were grown."""
-        return self.objective.once(("grown", fit.parameters.kind, frozenset(fit.effects), self.allowed), list)
+    def _model(self, fit: Fit) -> Hashable:
+        """The same for fits of the same model that grow to the same."""
+        return fit.parameters.kind, frozenset(fit.effects), self.allowed
 
     def _add(self, now: Fit) -> list[Fit]:
         self.note(f"looking beyond {words(now.effects) or 'the linear model'}")
