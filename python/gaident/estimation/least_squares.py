@@ -16,7 +16,7 @@ Vector = NDArray[np.float64]
 Matrix = NDArray[np.float64]
 
 NEARBY = 0.15, 0.3, 0.7  # no decision: of a base parameter, of its unit at least, of a step of an effect: where it is searched
-DAMPINGS = 10.0 ** np.arange(-3.0, 5.0)  # no decision: times the damping of the step before
+DAMPINGS = 10.0 ** np.arange(-3.0, 5.0)  # no decision: of a solver; times the damping of the step before
 NEGLIGIBLE_FALL = 0.02  # no decision: of the noise variance: a fall of the cost by less changes no decision
 
 
@@ -141,7 +141,7 @@ def evolved(objective: Objective, found: Fit, generations: int) -> Fit:
     low, high = np.maximum(found.x - reach, limits[0])[moved], np.minimum(found.x + reach, limits[1])[moved]
     if np.any(low >= high) or not np.all(np.isfinite(found.x)):
         return found
-    # no decision: inside of the bounds
+    # no decision: of a solver: inside of the bounds
     start = low + (high - low) * np.clip((found.x[moved] - low) / (high - low), 1e-6, 1.0 - 1e-6)
 
     def costs(columns: Matrix) -> Vector:

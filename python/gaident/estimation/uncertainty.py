@@ -28,7 +28,7 @@ from gaident.results.estimate import Estimate
 
 __all__ = ["controller_part", "covariance_of", "estimates_of"]
 
-BLOCKS = 8  # no decision: of a jackknife, how finely a deviation is known
+BLOCKS = 8  # no decision: how many parts of a jackknife
 
 Vector = NDArray[np.float64]
 Matrix = NDArray[np.float64]

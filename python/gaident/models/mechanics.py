@@ -139,7 +139,7 @@ class TwoMass:
     JL: float
     DL: float
     KG: float
-    DG: float = 0.0  # no decision: a shaft without damping, where none is given
+    DG: float = 0.0  # no decision: what an argument may be: a shaft without damping
     inconsistency: float | None = None
     std: Mapping[str, float] = field(default_factory=dict, hash=False)
     with_shaft_damping: TwoMass | None = None

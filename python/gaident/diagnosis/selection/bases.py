@@ -236,7 +236,7 @@ def _by_output_errors(task: Task) -> ByOutputErrors:
     )
     heaviest = inertia.value + POLICY.heavier * inertia.std if task.data.torque_measured else None
     rigid = axis.force_error**2 < POLICY.rigid_left
-    below = 2.0 * np.pi * POLICY.rigid_band * axis.cutoff_hz if rigid else 0.0  # no decision: rad/s of Hz
+    below = 2.0 * np.pi * POLICY.rigid_band * axis.cutoff_hz if rigid else 0.0  # no decision: a unit; rad/s of Hz
     return ByOutputErrors(replace(raw.task, rigid_below=below).under(OutputErrors(1.0, weight, heaviest)), axis)
 
 
@@ -250,8 +250,8 @@ def _axis(data: DataSet) -> InverseDynamics | None:
         return None
     records, highest = list(data.records), POLICY.highest_band / data.records[0].dt
     cutoffs = [min(cutoff_of(r, ORDER) for r in records)]
-    while 2.0 * cutoffs[-1] <= highest:  # no decision: steps of a search
-        cutoffs.append(2.0 * cutoffs[-1])
+    while 2.0 * cutoffs[-1] <= highest:  # no decision: a grid: octaves
+        cutoffs.append(2.0 * cutoffs[-1])  # no decision: a grid: octaves
     doubtful: InverseDynamics | None = None
     for cutoff in cutoffs:
         try:
