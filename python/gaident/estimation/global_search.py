@@ -29,19 +29,20 @@ Matrix = NDArray[np.float64]
 Coordinates: TypeAlias = tuple[Callable[[Vector], Vector], Callable[[Matrix], Matrix]]
 """(coordinates of one x, rows of x of rows of coordinates)."""
 
-PART, LEAST = 0.15, 0.3  # no decision: where one mass is searched: part of a base parameter, and of its unit at least
-STEPS, STEPS_IMPACTS = 0.7, 5.0  # no decision: the same of an effect, in its steps; and of one with impacts
-SHAFT = np.array([0.05, 1.0, 1.6, 1.0, 1.6, 0.5])  # no decision: the same of two masses, in the coordinates above
+PART, LEAST = 0.15, 0.3  # no decision: a start; where one mass is searched: part of a base parameter, and of its unit at least
+STEPS, STEPS_IMPACTS = 0.7, 5.0  # no decision: a start; the same of an effect, in its steps, and of one with impacts
+SHAFT = np.array([0.05, 1.0, 1.6, 1.0, 1.6, 0.5])  # no decision: a start; the same of two masses, in the coordinates above
 LEAST_DAMPING = 5e-3  # no decision: a start; the damping ratio from which one is searched that is less, or negative
-NEAREST = 0.1  # no decision: the share of the reach within which the nearest members are drawn
-BELOW = -0.02  # no decision: the antiresonance of a shaft is below its resonance
+NEAREST = 0.1  # no decision: a start; the share of the reach within which the nearest members are drawn
+BELOW = -0.02  # no decision: a formula: the antiresonance of a shaft is below its resonance
 
 
 def evolved(objective: Objective, found: Fit, generations: int, draw: int = 0) -> Fit:
     """Differential evolution around a fit (Storn and Price 1997), then least squares from where it ends.
 
-    The first members are near the fit in some coordinates and far in others: each is drawn within a share of the reach, which is 1
-    in half of them, and from 0.1 to 1, evenly in its logarithm, in the others. draw: of several searches from the same fit, whose members differ.
+    The first members are near the fit in some coordinates and far in others.
+    Each is drawn within a share of the reach, which is 1 in half of them, and from 0.1 to 1, evenly in its logarithm, in the others.
+    draw: of several searches from the same fit, whose members differ.
     """
     from scipy.optimize import differential_evolution
 
@@ -54,12 +55,12 @@ def evolved(objective: Objective, found: Fit, generations: int, draw: int = 0) -
     own = slice(parameters.base, None)  # effects and start states stand in either vector alike
     low[own], high[own] = np.maximum(low[own], limits[0][own]), np.minimum(high[own], limits[1][own])
     if _on_a_shaft(parameters, found.x):
-        high[5] = min(high[5], BELOW)  # no decision: the place of ln(f0/e0)
+        high[5] = min(high[5], BELOW)  # no decision: a formula: the place of ln(f0/e0)
     moved = np.flatnonzero(reach > 0.0)
     if np.any(low[moved] >= high[moved]):
         return found
     low, high = low[moved], high[moved]
-    # no decision: inside of the bounds
+    # no decision: of a solver: inside of the bounds
     start = low + (high - low) * np.clip((at[moved] - low) / (high - low), 1e-6, 1.0 - 1e-6)
     rng, shape = np.random.default_rng(draw), (POLICY.population * len(moved), len(moved))
     shares = NEAREST ** np.maximum(rng.uniform(-1.0, 1.0, shape), 0.0) * rng.uniform(-1.0, 1.0, shape)
@@ -93,7 +94,9 @@ def _reach(parameters: Parameterisation, x: Vector) -> Vector:
 
 def _on_a_shaft(parameters: Parameterisation, x: Vector) -> bool:
     """Whether x is of two masses with a resonance and an antiresonance."""
-    return parameters.masses == 2 and bool(np.all(parameters.base_values(x[None, :])[0, [3, 5]] > 0.0))  # no decision: e0, f0
+    return parameters.masses == 2 and bool(
+        np.all(parameters.base_values(x[None, :])[0, [3, 5]] > 0.0)
+    )  # no decision: a formula: e0, f0
 
 
 def _coordinates(parameters: Parameterisation, x: Vector) -> Coordinates:
@@ -103,16 +106,16 @@ def _coordinates(parameters: Parameterisation, x: Vector) -> Coordinates:
     units, base = np.array(parameters.units), parameters.base
 
     def coordinates(x: Vector) -> Vector:
-        a, e1, e0, f1, f0 = x[1:base] * units
+        e1, e0, f1, f0 = (x[1:base] * units)[1:]
         damping = [np.log(max(b / (2.0 * np.sqrt(c)), LEAST_DAMPING)) for b, c in ((e1, e0), (f1, f0))]
         lower = np.log(f0 / e0)
         return np.concatenate([[-x[0] - lower, x[1], damping[0], np.log(e0), damping[1], lower], x[base:]])
 
     def back(Y: Matrix) -> Matrix:
         X = Y.copy()
-        e0, f0 = np.exp(Y[:, 3]), np.exp(Y[:, 3] + Y[:, 5])  # no decision: the places of ln e0 and ln(f0/e0)
-        X[:, 0] = -Y[:, 0] - Y[:, 5]  # no decision: the same
-        e1, f1 = 2.0 * np.exp(Y[:, 2]) * np.sqrt(e0), 2.0 * np.exp(Y[:, 4]) * np.sqrt(f0)  # no decision: 2 zeta w
+        e0, f0 = np.exp(Y[:, 3]), np.exp(Y[:, 3] + Y[:, 5])  # no decision: a formula: the places of ln e0 and ln(f0/e0)
+        X[:, 0] = -Y[:, 0] - Y[:, 5]  # no decision: a formula: the same
+        e1, f1 = 2.0 * np.exp(Y[:, 2]) * np.sqrt(e0), 2.0 * np.exp(Y[:, 4]) * np.sqrt(f0)  # no decision: a formula: 2 zeta w
         X[:, 2:base] = np.column_stack([e1, e0, f1, f0]) / units[1:]
         return X
 

@@ -15,7 +15,7 @@ __all__ = ["fit", "negligible", "reestimated", "scored"]
 Vector = NDArray[np.float64]
 Matrix = NDArray[np.float64]
 
-DAMPINGS = 10.0 ** np.arange(-3.0, 5.0)  # no decision: times the damping of the step before
+DAMPINGS = 10.0 ** np.arange(-3.0, 5.0)  # no decision: of a solver; times the damping of the step before
 NEGLIGIBLE_FALL = 0.02  # no decision: of the noise variance: a fall of the cost by less changes no decision
 
 

@@ -5,14 +5,15 @@ A decision is never made by a number that stands elsewhere: `tests/python/projec
 Numbers that follow from records without effects are calibrated: `python bench/blind.py --calibrate` writes them into
 `calibrated.json`, which is read here. The others are set by hand, for the reason that their row gives.
 
-Three groups stand in modules of their own: what a record shows (`records.py`), which linear model holds and in which band a
-regression looks (`linear.py`), what a proposed experiment may ask of the axis (`experiments.py`).
+Four groups stand in modules of their own: what a record shows (`records.py`), which linear model holds and in which band a
+regression looks (`linear.py`), which controllers are looked for (`controllers.py`), what a proposed experiment may ask of the
+axis (`experiments.py`).
 
 Effort is the last group (`effort.py`): what bounds the work of a search or a fit, such as iterations, starts, points of a grid,
 samples that are looked at. More of it may find more, and changes no decision about what was found.
 
 Other modules keep numbers that decide nothing and bound no search, each with a name in capitals or a comment
-`# no decision: why`. One that is compared or bounds looks like a number that decides, and says why in these words or a sentence:
+`# no decision: why`. Each looks like a number that decides to somebody, and says why it does not in these words or a sentence:
 
 - "a start": a value from which one fit begins, or the ends of a grid of them; how many there are is effort.
   The bounds and starts of an effect's parameters stand in its row of the library.
@@ -20,7 +21,7 @@ Other modules keep numbers that decide nothing and bound no search, each with a 
   A solver ends by its tolerance, and more steps of it change nothing.
 - "memory": the size of a block in which something is read or computed. Any other size gives the same result.
 - "a grid", orders and lags: the models, or frequencies of a test, among which a criterion chooses.
-- Formulas, units, formats of files, what an argument may be, how something is printed or drawn.
+- "a formula", "a unit", "a format" of files, "what an argument may be", "how many" there are, what is "printed" or "drawn".
 """
 
 from __future__ import annotations
@@ -29,6 +30,7 @@ import math
 from dataclasses import dataclass, fields
 from typing import NamedTuple
 
+from gaident.policy.controllers import ControllerRanges
 from gaident.policy.declared import (
     AHEAD,
     DRIVES,
@@ -67,7 +69,7 @@ __all__ = ["POLICY", "Decisions", "Policy", "PolicyRow", "rows"]
 class Decisions:
     """The numbers that decide, in the order of the questions that they answer.
 
-    The last questions have modules of their own: `records.py`, `linear.py`, `experiments.py`.
+    Others have modules of their own: `controllers.py`, `records.py`, `linear.py`, `experiments.py`.
     """
 
     # Is the gain enough? One criterion: BIC and a penalty for each effect, which stands for the number of candidates tried.
@@ -335,6 +337,9 @@ class Decisions:
     resample_finer: float = reading(100.0, "1", "of a log's step over the given one: finer, the given step is in another unit")
     unit_shown: float = reading(0.02, "1", "relative difference up to which a slope shows a unit, a jump an integer's range")
     derivative: float = reading(0.98, "1", "correlation of a column with the slope of another, from which it is its derivative")
+    derivative_samples: int = reading(
+        20, "samples", "that a column has more than, to be looked at for it: few samples follow each other by chance"
+    )
     wrap_jump: float = reading(0.75, "1", "of a position's range: a jump as long may be a counter that wraps")
     wrap_beside: float = reading(0.25, "1", "of that jump: the steps beside it are shorter")
     wrap_alike: float = reading(0.05, "1", "of that jump, by which the steps before and behind it differ at most")
@@ -369,7 +374,7 @@ class Decisions:
 
 
 @dataclass(frozen=True)
-class Policy(Effort, Experiments, LinearModels, Records, Decisions):
+class Policy(Effort, Experiments, LinearModels, Records, ControllerRanges, Decisions):
     """The whole table: first what decides, then effort. `rows()` lists all with unit, source and command."""
 
 

@@ -186,7 +186,8 @@ def closer_numbers(torque: FoundNumbers, model: FoundNumbers) -> Text:
 
 def _of_the_controller(mechanics: Mapping[str, Estimate]) -> list[Text]:
     """What is said where most of the deviations of the mechanics comes from numbers of the controller that were found."""
-    mostly = [name for name, e in mechanics.items() if 2.0 * e.of_controller**2 > e.std**2 > 0.0]  # no decision: half of it
+    # no decision: a formula: more than half of a variance
+    mostly = [name for name, e in mechanics.items() if 2.0 * e.of_controller**2 > e.std**2 > 0.0]
     text = (
         "Most of the deviation of {} comes from the numbers, or the clock, of the controller, which the records had to show: "
         "give them, or log every one of its samples."

@@ -10,8 +10,9 @@ This is the one decision of the search; its numbers stand in the policy.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Hashable, Iterable
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Hashable, Iterable, Sequence
+from dataclasses import dataclass, field, replace
+from weakref import WeakKeyDictionary
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,7 +31,7 @@ from gaident.estimation.prediction import ClosedLoop, ObserverLoop, OpenLoop, Pr
 from gaident.estimation.term import Term
 from gaident.policy.table import POLICY, Policy
 
-__all__ = ["ModelSpace", "representative", "words"]
+__all__ = ["Grown", "ModelSpace", "representative", "words"]
 
 Vector = NDArray[np.float64]
 
@@ -59,6 +60,21 @@ def _linear_part(fit: Fit) -> tuple[Hypothesis, Vector]:
     return hypothesis, x
 
 
+class Grown:
+    """The fits from which a search has grown others, of each model over each objective, in the order in which it did."""
+
+    def __init__(self) -> None:
+        self._fits: WeakKeyDictionary[Objective, dict[Hashable, list[Fit]]] = WeakKeyDictionary()
+
+    def note(self, objective: Objective, model: Hashable, fit: Fit) -> None:
+        """One more fit of a model."""
+        self._fits.setdefault(objective, {}).setdefault(model, []).append(fit)
+
+    def of(self, objective: Objective, model: Hashable) -> Sequence[Fit]:
+        """Those of a model."""
+        return self._fits.get(objective, {}).get(model, ())
+
+
 @dataclass(frozen=True, eq=False)
 class ModelSpace:
     """The models that can be made of a library over one objective, and the moves between them."""
@@ -69,6 +85,7 @@ class ModelSpace:
     policy: Policy = POLICY
     shown: frozenset[str] = frozenset()  # families of effects that the records show by themselves
     rigid_below: float = 0.0  # rad/s, below which the records show one rigid body
+    grown: Grown = field(default_factory=Grown)
 
     # What a model is worth.
 
@@ -194,7 +211,7 @@ class ModelSpace:
         Beside impacts the share is larger: one impact too many leaves an error even with the true parameters.
         Other effects can fit that error.
         """
-        impacts = any(t.impacts for t in simpler.parameters.terms)
+        impacts = simpler.impacts
         if self.quiet(fuller) and not impacts:
             return True
         noise = self.objective.count * self.noise_beside(fuller) ** 2
@@ -314,7 +331,7 @@ class ModelSpace:
         if fit.predictor.closed and self.whitens and not self.data.loop_only:
             # Parameters found in closed loop may be a good start for the open loop, whose errors show more.
             predictors.append(OpenLoop(self.data, fit.predictor.own_angle))
-            if ObserverLoop.possible(self.data) and any(t.impacts for t in fit.parameters.terms):
+            if ObserverLoop.possible(self.data) and fit.impacts:
                 predictors.append(ObserverLoop(self.data, fit.predictor.own_angle))
         if not fit.predictor.own_angle and not self.data.angle_logged and any(t.harmonic for t in fit.parameters.terms):
             predictors.append(replace(fit.predictor, own_angle=True))  # type: ignore[type-var]
@@ -344,7 +361,7 @@ class ModelSpace:
 
         The cost has a local minimum for each number of impacts, also where the errors are as small as the noise of the velocity.
         """
-        if not any(t.impacts for t in fit.parameters.terms):
+        if not fit.impacts:
             return fit
         in_vain = 0
         for draw in range(self.policy.deepenings):

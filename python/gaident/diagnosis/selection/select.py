@@ -303,7 +303,7 @@ def _on_all_samples(task: Task, outline: _Found, note: Callable[[str], None]) ->
     """
     data, family, found = task.data, task.objective.family, outline.space.objective.family
     if outline.final.parameters.masses == 1:  # no stiff shaft, no fine substeps
-        coarse = 0.5 * data.dt  # no decision: the step of a simulation
+        coarse = 0.5 * data.dt  # no decision: of a solver: the step of a simulation
         data = replace(data, finest=max(data.finest, coarse))
     if isinstance(found, Innovations) and found.shaft is not None:
         shaft = ShaftNoise(outline.base.parameters.linear(outline.base.x), data.dt, data.pi)
