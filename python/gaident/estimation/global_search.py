@@ -41,7 +41,7 @@ def evolved(objective: Objective, found: Fit, generations: int, draw: int = 0) -
     """Differential evolution around a fit (Storn and Price 1997), then least squares from where it ends.
 
     The first members are near the fit in some coordinates and far in others.
-    Each is drawn within a share of the reach, which is 1 in half of them, and from 0.1 to 1, evenly in its logarithm, in the others.
+    Each is drawn within a share of the reach: 1 in half of them, and from 0.1 to 1, evenly in its logarithm, in the others.
     draw: of several searches from the same fit, whose members differ.
     """
     from scipy.optimize import differential_evolution
@@ -107,7 +107,8 @@ def _coordinates(parameters: Parameterisation, x: Vector) -> Coordinates:
 
     def coordinates(x: Vector) -> Vector:
         e1, e0, f1, f0 = (x[1:base] * units)[1:]
-        damping = [np.log(max(b / (2.0 * np.sqrt(c)), LEAST_DAMPING)) for b, c in ((e1, e0), (f1, f0))]
+        # no decision: a formula: zeta = e1/(2 w)
+        damping = [np.log(max(0.5 * b / np.sqrt(c), LEAST_DAMPING)) for b, c in ((e1, e0), (f1, f0))]
         lower = np.log(f0 / e0)
         return np.concatenate([[-x[0] - lower, x[1], damping[0], np.log(e0), damping[1], lower], x[base:]])
 
