@@ -814,12 +814,27 @@ def test_deepened_searches_near_impacts_until_nothing_more_is_gained(monkeypatch
 def test_where_one_with_impacts_leads_all_of_them_are_searched(monkeypatch: pytest.MonkeyPatch) -> None:
     bench = Bench({"gap": (0.5,)}, masses=2)
     gap, alike, plain = (bench.fit(t) for t in (IMPACTS, replace(IMPACTS, name="a"), B))
-    monkeypatch.setattr(type(bench.space), "search", lambda space, fit: replace(fit, bic=fit.bic - 1.0))
+    monkeypatch.setattr(type(bench.space), "evolved", lambda space, fit: replace(fit, bic=fit.bic - 1.0))
     monkeypatch.setattr(type(bench.space), "quiet", lambda space, fit: False)
-    found = bench.space.searched_alike([gap, alike, plain])
+    bare = bench.fit()
+    found = bench.space.searched_alike(bare, [gap, alike, plain])
     assert [f.bic for f in found] == [gap.bic - 1.0, alike.bic - 1.0, plain.bic]
     leads = replace(plain, bic=gap.bic - 1e3)
-    assert bench.space.searched_alike([gap, leads]) == [gap, leads], "another effect leads"
+    assert bench.space.searched_alike(bare, [gap, leads]) == [gap, leads], "another effect leads"
+    assert bench.space.searched_alike(gap, [gap, alike]) == [gap, alike], "beside a gap that is there already"
+
+
+def test_where_impacts_leave_more_than_noise_the_others_are_rivals(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Its search may have missed the minimum of either."""
+    bench = Bench({"gap": (0.5,)}, masses=2)
+    gap, other = bench.fit(IMPACTS), replace(bench.fit(replace(IMPACTS, name="b")))
+    assert other.bic > gap.bic + 10.0 * bench.space.margin, "far behind"
+    space = type(bench.space)
+    monkeypatch.setattr(space, "add", lambda self, fit: [other])
+    monkeypatch.setattr(space, "deepened", lambda self, fit: fit)
+    for noise in (True, False):
+        monkeypatch.setattr(space, "is_noise", lambda self, fit, noise=noise: noise)
+        assert [r.effect for r in rivals_of(bench.space, gap, "gap")[1]] == ([] if noise else ["b"])
 
 
 def test_demoted_takes_a_linear_model_too() -> None:

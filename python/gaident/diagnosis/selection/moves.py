@@ -140,7 +140,7 @@ class Moves(Repeated):
         reach = self.policy.beam_reach * self.penalty
         fits += [self.under_best_predictor(f) if self.score(f) < self.score(best[0]) + reach else f for f in best]
         if fits:
-            fits = self.searched_alike(fits)
+            fits = self.searched_alike(now, fits)
             fits += self.as_own_resonance(min(fits, key=self.score))
             fits += self.at_the_load(now, fits)
         return self._best(now, fits)

@@ -32,7 +32,8 @@ class Repeated(SideMoves):
                 break
             fit = min((fit, self.restarted(fit, term)), key=lambda f: f.bic)
             if term.multimodal and not self.quiet(fit):
-                fit = min((fit, self.evolved(fit)), key=lambda f: f.bic)
+                draws = range(self.policy.draws_of_impacts if term.impacts else 1)
+                fit = min((fit, *(self.evolved(fit, draw) for draw in draws)), key=lambda f: f.bic)
         return self.with_best_resonance(self.under_best_predictor(fit) if fit.effects else fit)
 
     def with_best_resonance(self, fit: Fit) -> Fit:
@@ -73,9 +74,8 @@ class Repeated(SideMoves):
         best = min(tries, key=lambda f: f.bic)
         return self.refitted(best.hypothesis, best.x)
 
-    def searched_alike(self, fits: Sequence[Fit]) -> list[Fit]:
-        """Models, of which all with impacts are searched where one of these leads: a local fit does not tell which is better."""
-        lead = min(fits, key=self.score)
-        if not lead.impacts or self.quiet(lead):
+    def searched_alike(self, now: Fit, fits: Sequence[Fit]) -> list[Fit]:
+        """Models that a model grew to: all with impacts are searched where one of these leads, as local fits tell nothing."""
+        if now.impacts or not (lead := min(fits, key=self.score)).impacts or self.quiet(lead):
             return list(fits)
-        return [self.search(f) if f.impacts else f for f in fits]
+        return [min((f, self.evolved(f)), key=self.score) if f.impacts else f for f in fits]

@@ -58,7 +58,9 @@ def rivals_of(space: Moves, final: Fit, effect: str, equivalent: Collection[str]
                 continue
             if not space.beyond_simulation(final, f) or (behind < -space.penalty and not space.in_both_loops(final, f)):
                 continue
-        if behind < space.margin:
+        # Where a model with impacts leaves more than noise, the search has missed its minimum, or that of another one.
+        missed = term.impacts and other.impacts and not space.is_noise(final)
+        if behind < space.margin or missed:
             found.append(Replacement(other.name, behind, f))
     if turned is not None and elsewhere is not None and turned.bic - final.bic < space.margin:
         there = Replacement(elsewhere, turned.bic - final.bic, turned)
