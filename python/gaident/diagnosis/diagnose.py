@@ -136,7 +136,9 @@ def diagnose(
     with threadpool_limits(1, user_api="blas"), np.errstate(over="ignore", invalid="ignore"):
         note(0.01, "replaying the controller, and looking for its form where it does not fit")
         driving = driving_of(records, validating, asked, driven, origin)
-        driving = replace(driving, outliers={r.digest: hit for r, hit in zip(given, lines, strict=True)})
+        hit = {r.digest: outliers for r, outliers in zip(given, lines, strict=True)}
+        clocked = controller is not None and controller.clock is not None
+        driving = replace(driving, outliers=hit, clocked=clocked, left_open=controller is not None and bool(controller.unknown))
         note(0.02, "identifying the linear model")
 
         def searched(driving: Driving, most: int, idn: Identification | None = None) -> Work:

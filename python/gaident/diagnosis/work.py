@@ -43,7 +43,7 @@ from gaident.diagnosis.library.record import findings_of_the_record
 from gaident.diagnosis.library.sides import called_of, name_of, sides_of
 from gaident.diagnosis.library.terms import LIBRARY, in_controller
 from gaident.diagnosis.linear_part import linear_of_part
-from gaident.diagnosis.mechanics import base_shift, mechanics_of, negative_damping
+from gaident.diagnosis.mechanics import base_shift, mechanics_of, negative_damping, of_the_age
 from gaident.diagnosis.note import Note
 from gaident.diagnosis.records.folded import ADVICE, folded
 from gaident.diagnosis.records.hygiene import cleaned, left_out, quantisation, unexplained
@@ -100,7 +100,7 @@ class Work:
         whole = self.driving.read
         read = as_read(whole, [cleaned(r, h) for r, h in zip(whole, others, strict=True)], self.controller)
         data = DataSet.of(clean, self.controller, any(len(h) for h in others), read, self.step, self.axis, self.pitch)
-        data = data.with_its_period()
+        data = replace(data.with_its_period(), clocked=self.driving.clocked)
         self.notes += period_seen(data)
         self.scales = scales_of(data)
         self.controller_steps, self.at_controller, notes = controller_findings(data, self.scales)
@@ -292,7 +292,8 @@ class Work:
         if driver is not None and (dropped := [e for e in self.final.effects if e not in causes]):
             shown = driver if self.left.gains[driver] > self.left.needed else None
             self.notes.append(closest(dropped, shown, bool(real)))
-        self.notes += (*of_the_mechanics(mechanics), *check.notes)
+        of_age = of_the_age(self.under, self.estimate)
+        self.notes += (*of_the_mechanics(mechanics, of_age, self.data, self.driving.left_open), *check.notes)
         if self.final.parameters.on_a_spring and any(LIBRARY[e].constant for e in self.final.effects):
             self.notes.append(
                 Text("The axis is on a spring to the ground: its tension where the record starts is part of the constant load.")

@@ -56,6 +56,7 @@ class DataSet:
     A torque that drives a model is delayed by the age. In a simulated loop the velocity is that difference.
     other_ages: ages that are possible too; a model that does not exclude them is less certain by what they change.
     found: numbers of the controller that the records show; their uncertainty is part of every deviation.
+    clocked: whether the sample time of the controller was given.
     """
 
     records: tuple[Record, ...]
@@ -77,6 +78,7 @@ class DataSet:
     age: float = 0.0
     other_ages: tuple[float, ...] = ()
     found: FoundNumbers | None = None
+    clocked: bool = False
 
     @classmethod
     def of(
@@ -249,6 +251,14 @@ class DataSet:
     def slower(self) -> bool:
         """Whether the log has fewer lines than the controller samples: the torque is then known on the lines only."""
         return self.controller is not None and self.controller.log_every(self.dt) > 1
+
+    @property
+    def known_between(self) -> bool:
+        """Whether it is known which torque drives the motor between the lines of the log.
+
+        It follows from the controller, or the log has a line for each of the samples that the controller was given.
+        """
+        return self.loop_follows or (self.clocked and not self.slower)
 
     def loaded(self, records: Sequence[Record], controller: Controller | None) -> tuple[LoadedRecord, ...]:
         """Records as the core takes them, in this loop; those of the data set itself are loaded once.

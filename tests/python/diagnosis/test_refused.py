@@ -13,6 +13,7 @@ import pytest
 import gaident as ga
 from gaident.diagnosis.explain.determined import determined, not_determined
 from gaident.diagnosis.explain.wording import of_the_mechanics
+from gaident.estimation.dataset import DataSet
 from gaident.diagnosis.library.terms import LIBRARY
 from gaident.diagnosis.selection.attribution import of_known_size
 
@@ -80,10 +81,12 @@ def test_a_negative_damping_is_said_beside_what_is_left_too(monkeypatch: pytest.
 
 def test_a_pair_with_a_negative_damping_is_said() -> None:
     damped = {"resonance_damping": ga.Estimate(0.02, 0.001, "1"), "antiresonance_damping": ga.Estimate(-0.0077, 0.0001, "1")}
-    (note,) = of_the_mechanics(damped)
+    data = DataSet.of([record(2)], None)
+    (note,) = of_the_mechanics(damped, {}, data, False)
     assert note.startswith("The antiresonance has a damping ratio of -0.0077, below 0 beyond its deviation")
     assert "load inertia and stiffness" in note and "load mass and stiffness" in note.linear
-    assert not of_the_mechanics(damped | {"antiresonance_damping": ga.Estimate(-0.0077, 0.004, "1")})
+    doubtful = damped | {"antiresonance_damping": ga.Estimate(-0.0077, 0.004, "1")}
+    assert not of_the_mechanics(doubtful, {}, data, False)
 
 
 def test_that_none_is_named_is_said_only_where_none_is(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -43,6 +43,7 @@ class Driving:
     regained_from: the PI that was given, where records without a torque show other gains. lag: behind which a measured torque was
     logged; the records then contain the one before it. found: the controller's numbers that the records show.
     outliers: digest of a record as given -> lines whose velocity stands in the log alone, interpolated here.
+    clocked: whether the sample time of the controller was given. left_open: whether some of its numbers were not.
     """
 
     moved: Aligned
@@ -57,6 +58,8 @@ class Driving:
     lag: Lag | None = None
     found: FoundNumbers | None = None
     outliers: Mapping[str, NDArray[np.intp]] = field(default_factory=dict)
+    clocked: bool = False
+    left_open: bool = False
 
     def regained(self, other: OtherGains) -> Driving:
         """The same under other gains, which command and velocity show where no torque is logged; a finding says so."""
