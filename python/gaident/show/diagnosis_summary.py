@@ -387,8 +387,9 @@ def _next(dia: Diagnosis, axis: str) -> list[str]:
 def next_words(dia: Diagnosis, p: Proposal) -> Text:
     """Why the experiment p comes next, what it tells apart and how surely."""
     margin = f", {certainty(p.margin)} ({p.margin:.0f} BIC units, 10 are enough)" if math.isfinite(p.margin) else ""
-    text = say("{} It tells {}{}.", p.reason, joined(" from ", map(called, p.separates)), margin)
-    rest = dict.fromkeys(a for f in dia.findings for a in f.alternatives if a not in p.separates)
+    told = [(name, *p.alike.get(name, ())) for name in p.separates]
+    text = say("{} It tells {}{}.", p.reason, joined(" from ", (joined(" or ", map(called, names)) for names in told)), margin)
+    rest = dict.fromkeys(a for f in dia.findings for a in f.alternatives if not any(a in names for names in told))
     return say("{} It was not chosen for {}.", text, joined(" or ", map(called, rest))) if rest else text
 
 
