@@ -17,12 +17,14 @@ from numpy.typing import NDArray
 if TYPE_CHECKING:
     from gaident.control.controller import Limiting
 
-__all__ = ["Scales", "Term"]
+__all__ = ["PHASE", "Scales", "Term"]
 
 Vector = NDArray[np.float64]
 Matrix = NDArray[np.float64]
 Natural = Callable[[Matrix], Matrix]
 Rows = list[tuple[float, ...]]
+
+PHASE = 1.0  # no decision: rad; by so much a phase is off where its two components are off by the whole amplitude
 
 
 @dataclass(frozen=True)
@@ -92,6 +94,7 @@ class Term:
     other_side: str = ""  # name of the same effect at the other end of the shaft
     at_load: bool = False  # of two masses: it acts there
     curve: Callable[[Vector, Mapping[str, float]], Vector] | None = None  # static torque at velocities [rad/s], as friction
+    scales: Mapping[str, float] = field(default_factory=dict)  # parameter whose 0 is nothing special -> what is much for it
 
     def stands_with(self, effects: Iterable[str]) -> bool:
         """Whether a model with these effects contains what its torque depends on."""

@@ -114,7 +114,9 @@ def estimates_of(objective: Objective, fit: Fit) -> dict[str, dict[str, Estimate
         for i, (name, unit) in enumerate((p.name, p.unit) for p in row.parameters):
             std = float("inf") if lost[i] else float(np.sqrt(max(variances[i], 0.0)))
             value = float(values[i])
-            known = std < abs(value) if value != 0.0 else np.isfinite(std)
+            # A phase of 0 is as good as any other: it is not compared with itself.
+            size = term.scales.get(name, abs(value))
+            known = std < size if size > 0.0 else np.isfinite(std)
             part_of_it = float(np.sqrt(max(parts[i], 0.0)))
             result[effect][name] = Estimate(value, std, unit, bool(bound[i]), bool(known), part_of_it)
     return result
