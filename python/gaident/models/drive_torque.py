@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from gaident.arguments import TORQUE
 from gaident.axis import Text, say
 from gaident.control import core
+from gaident.control.beside import beside_pi
 from gaident.control.controller import Controller
 from gaident.control.pi import PI, bare_pi
 from gaident.control.pi_torque import pi_block
@@ -66,11 +67,9 @@ def torque_driven(records: Sequence[Record], controller: Controller | None) -> D
         return Driven(tuple(records), controller)
     every = max(controller.log_every(r.dt) for r in records)
     if every == 1:
-        text = (
-            "The given controller is not kp and ki with the trapezoidal rule alone; it has another rule, a filter, a feedforward "
-            "or a limit. So the linear model is identified from its {torque}, not in a simulated loop."
-        )
-        note = say(text)
+        has = beside_pi(controller)
+        text = "Your controller has {}; so the linear model is identified from its {torque}, not in a simulated loop."
+        note = say(text, f"{has} beside kp and ki" if has else "a sample time of its own")
     else:
         text = (
             "The controller samples {} times for each line of the log. The linear model is identified from the logged "
