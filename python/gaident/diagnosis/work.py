@@ -226,7 +226,6 @@ class Work:
         """The effects that stand, and their gains. Where none stands, those of the search by whitened errors are judged."""
         while True:
             said = list(self.notes)
-            self.notes += basis_of(self.found)
             gains = self._accepted_gains()
             driver = self.left.driver if self.adequate else self.left.strongest
             adds_up = self.data.slower and not self.data.fits_in_loop  # what the torque lacks between the lines of the log
@@ -250,6 +249,7 @@ class Work:
             if why or check.loses:
                 driver = driver or self.left.strongest or "time"
                 self.notes += why
+            self.notes += basis_of(self.found, driver is not None)
             instead = None if causes else by_whitened_errors(self.found, self._equivalent_here, self._say)
             if instead is None:
                 self.notes += gains.notes

@@ -38,7 +38,18 @@ from gaident.estimation.projection import WORST, inverse_of, project_out
 from gaident.models.drive_torque import driven_by, torque_of
 from gaident.policy.table import POLICY
 
-__all__ = ["covariance_of_numbers", "moved", "numbers_in", "of_ages", "of_controller", "of_numbers", "refined", "slopes", "variance_of", "worth"]
+__all__ = [
+    "covariance_of_numbers",
+    "moved",
+    "numbers_in",
+    "of_ages",
+    "of_controller",
+    "of_numbers",
+    "refined",
+    "slopes",
+    "variance_of",
+    "worth",
+]
 
 Vector = NDArray[np.float64]
 Matrix = NDArray[np.float64]

@@ -220,7 +220,7 @@ def not_the_loop_words(dia: Diagnosis) -> Text:
     """What the free runs are, where the given controller is not the drive's."""
     if dia.torque_logged:
         return say(
-            "The logged {torque} does not follow from the given controller (see above): it drives these models, no loop is closed."
+            "The logged {torque} does not follow from this controller (see above): it drives these models, no loop is closed."
         )
     return Text("The simulated controller is not the drive's (see above): these figures include its errors.")
 

@@ -12,10 +12,10 @@ import pytest
 
 import gaident as ga
 from gaident.diagnosis.explain.determined import determined, not_determined
-from gaident.diagnosis.explain.wording import of_the_mechanics
-from gaident.estimation.dataset import DataSet
+from gaident.diagnosis.explain.wording import basis_of, of_the_mechanics
 from gaident.diagnosis.library.terms import LIBRARY
 from gaident.diagnosis.selection.attribution import of_known_size
+from gaident.estimation.dataset import DataSet
 
 module = importlib.import_module("gaident.diagnosis.work")
 
@@ -87,6 +87,16 @@ def test_a_pair_with_a_negative_damping_is_said() -> None:
     assert "load inertia and stiffness" in note and "load mass and stiffness" in note.linear
     doubtful = damped | {"antiresonance_damping": ga.Estimate(-0.0077, 0.004, "1")}
     assert not of_the_mechanics(doubtful, {}, data, False)
+
+
+def test_more_than_noise_is_no_contradiction_to_nothing_significant() -> None:
+    """Errors that are no noise, and yet depend on no signal beyond chance: both stand in one sentence."""
+    test, search = SimpleNamespace(contradicts=False), SimpleNamespace(whitens=False)
+    before = SimpleNamespace(space=SimpleNamespace(is_noise=lambda fit: False), final=None)
+    found: Any = SimpleNamespace(specification=test, space=search, whitened=before)
+    (alone,), (beside,) = (basis_of(found, left) for left in (False, True))
+    assert alone.startswith("What the model leaves is more than noise, but depends on no signal of these records beyond chance:")
+    assert beside.startswith("What the model leaves is more than noise: ")
 
 
 def test_that_none_is_named_is_said_only_where_none_is(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -183,7 +183,9 @@ def aged(noise: float, *others: float, follows: bool = True, clocked: bool = Fal
     driven = ga.Record(DT, torque=torque, velocity=np.zeros(n))
     model = ga.OneMass(J=J, D=D).model()
     seen = ga.simulate(model, driven) + noise * np.random.default_rng(3).standard_normal(n)
-    data = replace(DataSet.of([driven.with_channels(velocity=seen)], None), loop_follows=follows, clocked=clocked).aged(0.0, others)
+    data = replace(DataSet.of([driven.with_channels(velocity=seen)], None), loop_follows=follows, clocked=clocked).aged(
+        0.0, others
+    )
     return fit_over(data)
 
 

@@ -9,9 +9,9 @@ import pytest
 from numpy.typing import NDArray
 
 import gaident as ga
+from gaident.diagnosis.library.terms import LIBRARY
 from gaident.diagnosis.mechanics import mechanics_of
 from gaident.diagnosis.records.sizes import scales_of
-from gaident.diagnosis.library.terms import LIBRARY
 from gaident.estimation import uncertainty
 from gaident.estimation.dataset import DataSet
 from gaident.estimation.least_squares import fit as fitted

@@ -17,7 +17,8 @@ between torque and shaft, and is found there.
 A measured torque stands behind that delay, and is moved only where L agrees.
 
 A motion behind its torque needs no explanation where the torque follows from the controller, which reads and writes on the same
-lines, or where what the model has accounts for it: delay, lag, filter and the age of the velocity make a slow motion so much late.
+lines, or where what the model has accounts for it.
+Delay, lag, filter and the age of the velocity make a slow motion late by their sum.
 """
 
 from __future__ import annotations

@@ -54,8 +54,11 @@ def evidence_of(
     return say("{}: {} {}.", what, sure, worse)
 
 
-def basis_of(found: Selection) -> list[Text]:
-    """Which errors the parameters rest on, where these are not whitened ones or the specification test speaks against them."""
+def basis_of(found: Selection, left: bool) -> list[Text]:
+    """Which errors the parameters rest on, where these are not whitened ones or the specification test speaks against them.
+
+    left: whether something significant depends on a signal, as the verdict says.
+    """
     test = found.specification
     if test is None:  # a measured torque, as the user says
         return []
@@ -70,7 +73,8 @@ def basis_of(found: Selection) -> list[Text]:
         return []
     before = found.whitened
     if before is not None and not before.space.is_noise(before.final):
-        return [Text("What the model leaves is more than noise: the parameters are those of least output error.")]
+        depends = "" if left else ", but depends on no signal of these records beyond chance"
+        return [Text(f"What the model leaves is more than noise{depends}: the parameters are those of least output error.")]
     return [Text("A noise model would take a cause for noise here: the parameters are those of least output error.")]
 
 
@@ -125,9 +129,7 @@ def _swings_up(mechanics: Mapping[str, Estimate]) -> list[Text]:
     return [say(text, pair, e.value) for pair, e in found if e is not None and e.value < -POLICY.contradiction * e.std]
 
 
-def of_the_mechanics(
-    mechanics: Mapping[str, Estimate], ages: Mapping[str, float], data: DataSet, left_open: bool
-) -> list[Text]:
+def of_the_mechanics(mechanics: Mapping[str, Estimate], ages: Mapping[str, float], data: DataSet, left_open: bool) -> list[Text]:
     """Notes on what was estimated of the mechanism.
 
     ages: name -> the part of its deviation that the age of the velocity makes; left_open: whether the controller was given with
