@@ -169,6 +169,11 @@ class Drive:
             )
         return Limits(**self.limit_values)
 
+    @property
+    def expected(self) -> dict[str, tuple[float, float]]:
+        """The ranges of the mechanism that the drive file knows."""
+        return {name: self.space_values[name] for name in ("inertia", "resonance_hz", "damping") if name in self.space_values}
+
     def space(self, records: Sequence[Record], controller: Controller | None) -> SearchSpace | None:
         """The search space: what is given, the rest derived from the data; None where nothing is given."""
         given = dict(self.space_values)
