@@ -39,6 +39,7 @@ __all__ = [
 
 Vector = NDArray[np.float64]
 
+TWO_MASSES = 3  # no decision: poles of two masses
 HALF = 0.5  # no decision: of a sample, the age of a mean over it
 
 
@@ -185,9 +186,12 @@ def made_by(rec: Record, controller: Controller) -> Vector:
     """The torque [N m] (n,) that the controller makes of command and measured signals; RecordError where it cannot be made."""
     every = controller.log_every(rec.dt)
     if every > 1:
+        linear = "identify takes such a log as it is, but no diagnosis does. " if controller.line_equation(rec, TWO_MASSES) else ""
         raise RecordError(
             f"the record has no torque, and the controller samples {every} times for each of its lines: what it made between "
-            f"the lines of the velocity is lost; give {TORQUE}"
+            f"the lines of the velocity is lost; give {TORQUE}, or log each of its samples. {linear}"
+            "Where there is neither, leave the controller's period out: it is then taken for one at the rate of the log. What is "
+            "found is then approximate: an inertia is off by several percent, and a delay may be found that the drive has not"
         )
     if not controller.replayable(rec):
         needed = "a command" if controller.driven_by == "command" else "a position_command and a position"
