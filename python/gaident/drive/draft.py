@@ -169,6 +169,7 @@ class _Draft:
         ]
         if self.axis == "linear":
             lines.append(line_of('# pitch = "24 mm"', "with which a cogging returns: pitch of the screw, or of the poles"))
+            lines.append(line_of('# screw = "10 mm"', 'of a turn of the motor, for gains in N m s/rad: then axis = "rotary"'))
         for name in dict.fromkeys(needed_constant(channel, stated) for channel, stated in self.units.items() if stated):
             if name is not None:
                 value, meaning = _CONSTANTS[name]

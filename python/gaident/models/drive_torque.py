@@ -186,7 +186,9 @@ def made_by(rec: Record, controller: Controller) -> Vector:
     """The torque [N m] (n,) that the controller makes of command and measured signals; RecordError where it cannot be made."""
     every = controller.log_every(rec.dt)
     if every > 1:
-        linear = "identify takes such a log as it is, but no diagnosis does. " if controller.line_equation(rec, TWO_MASSES) else ""
+        linear = (
+            "identify takes such a log as it is, but no diagnosis does. " if controller.line_equation(rec, TWO_MASSES) else ""
+        )
         raise RecordError(
             f"the record has no torque, and the controller samples {every} times for each of its lines: what it made between "
             f"the lines of the velocity is lost; give {TORQUE}, or log each of its samples. {linear}"
