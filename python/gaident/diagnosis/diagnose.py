@@ -99,7 +99,7 @@ def diagnose(
         Stop at the first cause: the search takes one effect at most, or the fewest with which a cause is named.
         What else is there is left, and a note says so.
     expected : mapping, optional
-        Ranges of the mechanism as you know them: "inertia" [kg m^2], "resonance_hz" [Hz], "damping" [N m s/rad], all of the whole.
+        Ranges of the whole mechanism as you know it: "inertia" [kg m^2], "resonance_hz" [Hz], "damping" [N m s/rad].
         They bound no search; a note says what was found outside.
 
     Returns

@@ -24,6 +24,7 @@ from gaident.diagnosis.explain.determined import determined, not_determined
 from gaident.diagnosis.explain.held_out import standing
 from gaident.diagnosis.explain.verdict import verdict_of
 from gaident.diagnosis.explain.wording import (
+    ON_A_SPRING,
     basis_of,
     closer_numbers,
     closest,
@@ -292,12 +293,10 @@ class Work:
         if driver is not None and (dropped := [e for e in self.final.effects if e not in causes]):
             shown = driver if self.left.gains[driver] > self.left.needed else None
             self.notes.append(closest(dropped, shown, bool(real)))
-        of_age = of_the_age(self.under, self.estimate)
-        self.notes += (*of_the_mechanics(mechanics, of_age, self.data, self.driving.left_open), *check.notes)
+        ages = of_the_age(self.under, self.estimate)
+        self.notes += (*of_the_mechanics(mechanics, ages, self.data, self.driving.left_open), *check.notes)
         if self.final.parameters.on_a_spring and any(LIBRARY[e].constant for e in self.final.effects):
-            self.notes.append(
-                Text("The axis is on a spring to the ground: its tension where the record starts is part of the constant load.")
-            )
+            self.notes.append(ON_A_SPRING)
         ambiguous = [f for f in real if f.alternatives]
         proposal = None
         if ambiguous:

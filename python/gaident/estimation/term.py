@@ -9,15 +9,13 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-if TYPE_CHECKING:
-    from gaident.control.controller import Limiting
+from gaident.control.controller import Limiting
 
-__all__ = ["PHASE", "Scales", "Term"]
+__all__ = ["PHASE", "Scales", "Term", "limiting_of"]
 
 Vector = NDArray[np.float64]
 Matrix = NDArray[np.float64]
@@ -153,6 +151,15 @@ class Term:
     def needs_two_masses(self) -> bool:
         """Whether only a model of two masses may have it."""
         return self.in_coupling or self.at_load
+
+
+def limiting_of(effects: Mapping[Term, Vector]) -> Limiting:
+    """What all effects at the controller limit, each with its parameters."""
+    also = Limiting()
+    for term, values in effects.items():
+        assert term.limiting is not None
+        also = also.and_also(term.limiting(values))
+    return also
 
 
 _UNIT = Scales(1e-3, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 100.0, True, 1.0)

@@ -236,10 +236,10 @@ def test_without_a_torque_the_refusal_of_a_faster_controller_leads_on() -> None:
     done = ga.run(drive, ga.Record(1e-3, command=command, velocity=0.0 * command), linear)
     noise = 0.01 * np.random.default_rng(0).standard_normal(len(command))
     rec = ga.Record(1e-3, command=command, velocity=done.velocity + noise)
-    with pytest.raises(ga.errors.RecordError, match="identify takes such a log as it is.*leave the controller's period out"):
+    with pytest.raises(ga.errors.RecordError, match=r"identify takes such a log as it is.*leave the controller's period out"):
         ga.diagnose(rec, linear)
     limited = replace(linear, velocity=ga.PI(0.05, 1.0, torque_limit=9.0))
-    with pytest.raises(ga.errors.RecordError, match="or log each of its samples. Where there is neither, leave"):
+    with pytest.raises(ga.errors.RecordError, match=r"or log each of its samples\. Where there is neither, leave"):
         ga.diagnose(rec, limited)
     assert ga.identify(rec, linear).fit_percent > 90.0
     assert ga.diagnose(rec, replace(linear, period=None)).mechanics["inertia"].value == pytest.approx(1e-3, rel=0.1)

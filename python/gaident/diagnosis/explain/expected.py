@@ -22,8 +22,8 @@ CALLED = {"inertia": say("{inertia}"), "resonance_hz": Text("resonance"), "dampi
 def outside_of(expected: Mapping[str, tuple[float, float]], mechanics: Mapping[str, Estimate]) -> list[Text]:
     """Notes on values that were found outside of what was expected; none where nothing of that name was found."""
     text = (
-        "The {} was found as {:.4g} +- {:.2g} {}, outside of the range that was given ({:g} to {:g}): the mechanism is looked for "
-        "where the records show it, and one of the two is wrong."
+        "The {} was found as {:.4g} +- {:.2g} {}, outside of the range that was given ({:g} to {:g}): the mechanism is looked "
+        "for where the records show it, and one of the two is wrong."
     )
     notes = []
     for name, (low, high) in expected.items():

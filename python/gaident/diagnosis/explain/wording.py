@@ -18,6 +18,7 @@ from gaident.policy.table import POLICY
 from gaident.results.estimate import Estimate
 
 __all__ = [
+    "ON_A_SPRING",
     "basis_of",
     "closer_numbers",
     "closest",
@@ -31,6 +32,9 @@ __all__ = [
     "period_seen",
     "torque_unlogged",
 ]
+
+
+ON_A_SPRING = Text("The axis is on a spring to the ground: its tension where the record starts is part of the constant load.")
 
 
 def evidence_of(
