@@ -311,6 +311,17 @@ def test_a_torque_error_that_grows_is_explained_by_the_filter_or_counts_against_
     assert told not in flat(summary(result)), "about the same"
 
 
+def test_an_interval_is_said_with_as_many_digits_as_its_ends_need() -> None:
+    result = fake()
+    for rmse, interval, said in (
+        (0.2, (0.55, 0.64), "The error falls by 60 % (95 % interval 55 to 64 %)."),
+        (0.0003, (0.9993, 0.99945), "The error falls by 99.94 % (95 % interval 99.93 to 99.94 %)."),
+        (0.2, (0.6, 0.6), "The error falls by 60 %."),
+    ):
+        result.after, result.gain_interval = replace(result.after, rmse=rmse), interval
+        assert said in flat(summary(result)), said
+
+
 def test_the_verdict_names_what_is_found_and_what_is_one_of_several() -> None:
     result = fake()
     result.driver = result.line = None
