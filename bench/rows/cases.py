@@ -24,6 +24,8 @@
     unlogged    logs without a torque, of a controller with a filter that the given one has not (rows/unlogged.py)
     responses   frequency responses that a record shows by itself (rows/responses.py)
     headers     names of columns, commas and letters of text logs (rows/headers.py)
+    numbers     controllers with numbers that nobody gave (rows/numbers.py)
+    pitches     linear axes whose force returns with a length that nobody gave (rows/pitches.py)
 
 A result has three parts: an outcome, what is said (verdict and findings; the structure; the terms), and a digest of the rest that
 a user reads: parameters to three digits, notes, comparisons, the next experiment.
@@ -51,7 +53,9 @@ from rows.forms import forms, shown
 from rows.headers import header_read, headers
 from rows.lags import lag_found, lags
 from rows.logs import logs, read_log
+from rows.numbers import found_numbers, numbers
 from rows.periods import period_taken, periods
+from rows.pitches import pitch_seen, pitches
 from rows.profiles import interpolated, profiles
 from rows.proposals import kept, proposals
 from rows.responses import responses, shown_points
@@ -274,5 +278,7 @@ KINDS: dict[str, tuple[Callable[[int, int], list[Case]], Callable[[Case], Result
     "unlogged": (unlogged, form_found),
     "responses": (responses, shown_points),
     "headers": (headers, header_read),
+    "pitches": (pitches, pitch_seen),
+    "numbers": (numbers, found_numbers),
 }
 """Kind -> what makes its cases (count, seed), and what runs one."""

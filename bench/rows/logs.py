@@ -15,9 +15,10 @@ from rows.case import Case, Result, digest
 
 import gaident as ga
 from gaident.data import align
-from gaident.data.guess import position_and_velocity, unit_from_position, unit_from_velocity
+from gaident.data.guess import guess_channels, position_and_velocity, unit_from_position, unit_from_velocity
 from gaident.data.listing import columns as listed
 from gaident.data.signals.wraps import Unwrapper, overflow
+from gaident.drive.log_content import with_content
 
 __all__ = ["logs", "read_log"]
 
@@ -81,10 +82,10 @@ def unit(rng: np.random.Generator, name: str, noise: float) -> Result:
     position, seen = np.cumsum(w) * 1e-3, w / UNITS[name] * (1.0 + noise) + noise * np.std(w) * rng.standard_normal(len(w))
     follows = np.convolve(w, np.ones(60) / 60.0)[: len(w)]
     found = (unit_from_position(seen, position, 1e-3, False), unit_from_velocity(w / UNITS[name], follows, False))
-    pair = position_and_velocity({"a": position, "b": seen, "c": rng.standard_normal(len(w))}, 1e-3)
-    said = f"{found[0]}, {found[1]}, {pair}"
-    wrong = any(u not in (name, None) for u in found) or pair not in (("a", "b"), None)
-    return Result("wrong" if wrong else "missed" if None in (*found, pair) else "right", said, "")
+    columns = position_and_velocity({"a": position, "b": seen, "c": rng.standard_normal(len(w))}, 1e-3)
+    said = f"{found[0]}, {found[1]}, {columns}"
+    wrong = any(u not in (name, None) for u in found) or columns not in (("a", "b"), None)
+    return Result("wrong" if wrong else "missed" if None in (*found, columns) else "right", said, "")
 
 
 def stamps(rng: np.random.Generator, jitter: float, digits: int, lost: bool, given: float | None = None) -> Result:
@@ -123,6 +124,24 @@ def grid(rng: np.random.Generator, step: float, pause: float) -> Result:
     return Result("missed" if pause > 5e-3 or not 1e-5 < step < 1.6e-3 else "right", "read", "")
 
 
+def pair(rng: np.random.Generator, samples: int, related: bool) -> Result:
+    """Three columns whose names say nothing, one of them the derivative of another, or none; so many lines."""
+    t = np.linspace(0.0, 1.0, samples)
+    w = sum(rng.normal() * np.sin(2.0 * np.pi * f * t + rng.uniform(0.0, 6.0)) for f in rng.uniform(0.3, 2.0, 3))
+    other = sum(rng.normal() * np.sin(2.0 * np.pi * f * t + rng.uniform(0.0, 6.0)) for f in rng.uniform(0.3, 2.0, 3))
+    first = np.concatenate([[0.0], np.cumsum(0.5 * (w[1:] + w[:-1]))]) if related else np.cumsum(rng.standard_normal(samples))
+    columns = {"col1": first, "col2": w, "col3": other}
+    rows = "\n".join(",".join(f"{x:.6f}" for x in row) for row in np.column_stack([t, *columns.values()]))
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "log.csv"
+        path.write_text(f"t [s],{','.join(columns)}\n{rows}\n")
+        listing = listed(path)
+    found = with_content(listing, guess_channels(listing), columns).channels
+    taken = {channel: found[channel].name for channel in ("position", "velocity") if channel in found}
+    truth = {"position": "col1", "velocity": "col2"} if related else {}
+    return Result("right" if taken == truth else "missed" if not taken else "wrong" if related else "false alarm", str(taken), "")
+
+
 MAKERS: dict[str, Callable[[np.random.Generator], Result]] = {
     **{f"clocks/{o:g} s/{r:g}/{n:g}": lambda g, o=o, r=r, n=n: clocks(g, o, r, n)
        for o, r, n in ((0.3, 0.0, 0.3), (-0.4, 2e-4, 0.3), (0.05, -3e-5, 1.0), (3.5, 0.0, 0.3), (0.2, 8e-4, 5.0))},
@@ -139,6 +158,8 @@ MAKERS: dict[str, Callable[[np.random.Generator], Result]] = {
     **{f"grid/{s:g}/{p:g}": lambda g, s=s, p=p: grid(g, s, p)
        for s, p in ((1e-3, 0.0), (1.4e-3, 0.0), (2e-3, 0.0), (4e-3, 0.0), (2e-5, 0.0), (7e-6, 0.0), (1e-6, 0.0),
                     (1e-3, 3e-3), (1e-3, 7e-3), (1e-3, 0.05))},
+    **{f"pair/{n}/{kind}": lambda g, n=n, kind=kind: pair(g, n, kind == "related")
+       for n in (6, 8, 12, 15, 18, 25, 35, 60) for kind in ("related", "strangers")},
 }  # fmt: skip
 """Name -> what draws such a log and says what came of it."""
 

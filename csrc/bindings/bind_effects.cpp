@@ -133,6 +133,8 @@ OwnPlace own_place_named(const std::string& name) {
     if (name == "command") return OwnPlace::command;
     if (name == "torque") return OwnPlace::torque;
     if (name == "friction") return OwnPlace::friction;
+    if (name == "torque@load") return OwnPlace::torque_at_load;
+    if (name == "friction@load") return OwnPlace::friction_at_load;
     if (name == "actuator") return OwnPlace::actuator;
     if (name == "sensor") return OwnPlace::sensor;
     throw std::invalid_argument("own: '" + name + "' is no place for an effect of one's own");
@@ -206,7 +208,9 @@ private:
             case OwnPlace::actuator: return signals_.torque;
             case OwnPlace::sensor: return signals_.velocity;
             case OwnPlace::torque:
-            case OwnPlace::friction: return nullptr;
+            case OwnPlace::friction:
+            case OwnPlace::torque_at_load:
+            case OwnPlace::friction_at_load: return nullptr;
         }
         return nullptr;
     }

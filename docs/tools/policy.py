@@ -83,12 +83,13 @@ The test is a variance ratio: the rms of errors over the noise sigma that the me
 that records without effects pass (`estimation/criterion.py`).
 It is asked of two errors, because they contain different things.
 
-- `noise_ratio`, of whitened errors: what a model leaves that its own past does not foretell. It decides whether a model is
-  adequate, and, of the linear model, whether output errors are searched first.
-- `free_run_ratio`, of errors before whitening, in the loop where it is the drive's: what a free run misses. A noise model takes
-  a slow misfit for noise, and then it shows here alone. It decides whether output errors are searched beside, whether a cause
-  was hidden, and whether the free run is noted as far off. Behind a measured torque, whose noise the free run adds up, the noise
-  of both counts, and it decides whether a model is adequate.
+- `noise_ratio`, of whitened errors: what a model leaves that its own past does not foretell.
+  It decides whether a model is adequate, and, of the linear model, whether output errors are searched first.
+- `free_run_ratio`, of errors before whitening, in the loop where it is the drive's: what a free run misses.
+  A noise model takes a slow misfit for noise, and then it shows here alone.
+  It decides whether output errors are searched beside, whether a cause was hidden, and whether the free run is noted as far off.
+  Behind a measured torque, whose noise the free run adds up, the noise of both counts, and it decides whether a model is
+  adequate.
 
 Four numbers ask something else, and no level of that test answers it:
 

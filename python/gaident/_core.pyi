@@ -315,8 +315,9 @@ class EffectRecord:
     ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
         """(velocity, torque, angle), models x samples; the last two empty unless `all`. substeps 0: as needed.
 
-        own: effects that the core does not know, each (torque, friction, actuator or sensor; function(velocity, angle, torque,
-        time, *parameters), arrays of one number per model side by side; parameters, models x parameters).
+        own: effects that the core does not know, each (command, torque, friction, actuator or sensor, the two of the shaft at the
+        load with @load behind; function(velocity, angle, torque, command, time, *parameters), arrays of one number per model side
+        by side; parameters, models x parameters).
         """
     def simulate_values(
         self,

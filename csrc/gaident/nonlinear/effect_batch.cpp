@@ -143,13 +143,14 @@ private:
         std::vector<double> constants(effect_constants * width);
         std::vector<Effects::Tables> tables(width);
         EffectRun run;
+        run.own_at_load = own != nullptr && (own->at(OwnPlace::torque_at_load) || own->at(OwnPlace::friction_at_load));
         int back = 0;
         for (std::size_t lane = 0; lane < width; ++lane) {
             const Planned& p = planned_[group[std::min(lane, group.size() - 1)]];
             EffectModel model = p.model;
             model.effects = set;
             PreparedEffects c;
-            prepare_effects(model, job_.record, job_.loop, p.substeps, p.start, c);
+            prepare_effects(model, job_.record, job_.loop, p.substeps, p.start, c, run.own_at_load);
             double flat[effect_constants];
             std::memcpy(flat, &c.constants, sizeof flat);
             for (std::size_t k = 0; k < effect_constants; ++k) constants[k * width + lane] = flat[k];

@@ -163,6 +163,7 @@ private:
             if constexpr (hook::begin<E>) E::begin(c, load_.states.template of<Key>(), start);
         });
         turning_ = turning_ || load_.turning;
+        load_.own.begin(plant_.load_velocity());
         // As for friction at the motor; where the step is too coarse for the resonance both ends cannot be solved.
         if (load_.dry) {
             const R alone = fnma(plant_.back() / plant_.beta(), plant_.across(), plant_.load_beta());

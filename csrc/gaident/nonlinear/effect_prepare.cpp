@@ -171,7 +171,7 @@ int substeps_for(const EffectModel& model, const EffectRecord& record, const Loo
 }
 
 void prepare_effects(const EffectModel& model, const EffectRecord& record, const Loop& loop, int substeps, const double* start,
-                     PreparedEffects& out) {
+                     PreparedEffects& out, bool own_at_load) {
     const Structure s = model.linear.structure;
     if (s.p < 1) throw std::invalid_argument("poles: a model with effects needs more poles than zeros");
     const double Ts = record.sample_time, h = Ts / substeps;
@@ -194,7 +194,7 @@ void prepare_effects(const EffectModel& model, const EffectRecord& record, const
     });
     Delta<double> whole;
     if (moving) whole = plant_of(model.linear, loop, Ts);
-    out.two_masses = model.effects.needs_two_masses();
+    out.two_masses = model.effects.needs_two_masses() || own_at_load;
     if (out.two_masses) two_masses(model, h, Ts, &whole, start, u, c);
     else observer(model.linear, h, substeps, &whole, start, u, c);
     if (!possible) c.x[0] = any_value;

@@ -33,6 +33,7 @@ struct EffectRun {
     std::size_t history_mask = 0;
 
     OwnEffects* own = nullptr;           // asked through these
+    bool own_at_load = false;            // some of them at the load
     OwnSignals own_signals{};            // width numbers each,
     const double* own_answer = nullptr;  // and answering there
 
@@ -146,6 +147,35 @@ private:
     const EffectRun& run_;
     bool command_, torque_, friction_, actuator_, sensor_, shaft_;
     R w_before_, level_ = R(0.0);
+};
+
+// Those at the load of two masses, for the loop that has one.
+template <class R>
+class OwnAtLoad {
+public:
+    explicit OwnAtLoad(const EffectRun& run)
+        : torque_(at(run, OwnPlace::torque_at_load)), friction_(at(run, OwnPlace::friction_at_load)) {}
+
+    bool there() const { return OwnInLoop<R>::asks && (torque_ || friction_); }
+    bool friction() const { return OwnInLoop<R>::asks && friction_; }
+    void begin(R w) { w_before_ = w; }
+
+    // The torque that they add there, evaluated at the load's predicted mean velocity; u: the motor's torque.
+    [[gnu::always_inline]] R torque(const EffectRun& run, R w, R theta, R u, double t) {
+        const R middle = fma(w - w_before_, R(0.5), w);
+        w_before_ = w;
+        const double since = t > 0.0 ? t : 0.0;
+        if (friction_) level_ = OwnInLoop<R>::asked(run, OwnPlace::friction_at_load, middle, theta, u, since);
+        return torque_ ? OwnInLoop<R>::asked(run, OwnPlace::torque_at_load, middle, theta, u, since) : R(0.0);
+    }
+    // The friction evaluated with it [N m].
+    R level() const { return level_; }
+
+private:
+    static bool at(const EffectRun& run, OwnPlace place) { return OwnInLoop<R>::asks && run.own_at_load && run.own->at(place); }
+
+    bool torque_, friction_;
+    R w_before_ = R(0.0), level_ = R(0.0);
 };
 
 }  // namespace gaident

@@ -56,6 +56,9 @@ template <Side side, class States>
     };
     if constexpr (side == Side::motor)
         if (own_.friction()) add(own_.level());
+    if constexpr (side == Side::load)
+        if (load_.own.friction()) [[unlikely]]
+            add(load_.own.level());
     each_at<side>([&]<class Key, class E>() __attribute__((always_inline)) {
         if constexpr (hook::level<E>)
             if (run_.effects.has<Key>()) add(E::level(c_.template of<Key>(), R(t > 0.0 ? t : 0.0)));
@@ -100,6 +103,8 @@ template <class R, class Plant, class Control>
         });
     }
     load_.braking = R(0.0) - T_load;
+    if (load_.own.there()) [[unlikely]]
+        T_load = T_load + load_.own.torque(run_, w_load, load_.theta, T, t);
     plant_.free_velocities(T, T_load, friction_torque_, load_.friction, states_);
     const FreeEnd<R> motor{w, plant_.free[0], plant_.beta()}, load{w_load, plant_.free[1], plant_.load_beta()};
     R w_next = motor.w_free, w_next_load = load.w_free;

@@ -62,6 +62,7 @@ template <class R, class Motor, class Load>
 // What the loop keeps of the load.
 template <class R>
 struct LoadSide {
+    OwnAtLoad<R> own;
     bool dry, turning;
     typename LoadEffects::States<R> states{};  // all zero
     FrictionLaw<R> law;
@@ -71,8 +72,9 @@ struct LoadSide {
     R twist_at_start;     // rad: the load's angle starts where the motor's does
 
     [[gnu::always_inline]] LoadSide(const EffectRun& run, R twist)
-        : dry(run.effects.meets(load_effects_with(dry_hooks))),
-          turning(run.effects.meets(load_effects_that_turn())),
+        : own(run),
+          dry(run.effects.meets(load_effects_with(dry_hooks)) || own.friction()),
+          turning(run.effects.meets(load_effects_that_turn()) || own.there()),
           twist_at_start(twist) {}
 };
 struct NoLoadSide {

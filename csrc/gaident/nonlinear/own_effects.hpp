@@ -9,18 +9,20 @@
 namespace gaident {
 
 enum class OwnPlace {
-    command,   // the velocity command that the controller follows in place of the one given, rad/s
-    torque,    // added to the motor's torque at the shaft, N m
-    friction,  // dry friction against the motion, its level >= 0, N m
+    command,         // the velocity command that the controller follows in place of the one given, rad/s
+    torque,          // added to the motor's torque at the shaft, N m
+    friction,        // dry friction against the motion, its level >= 0, N m
+    torque_at_load,  // the same two at the load of two masses
+    friction_at_load,
     actuator,  // the torque that acts in place of the one commanded, N m
     sensor,    // the velocity that the sensor shows in place of the true one, rad/s
 };
 
 // What they may ask for, lanes side by side; the arrays stay where they are for as long as a run lasts.
 struct OwnSignals {
-    double* velocity;   // rad/s: at the shaft that in the middle of the substep, foreseen
-    double* angle;      // rad
-    double* torque;     // N m: at the shaft what saturation, dead band, delay and lag left of the command
+    double* velocity;   // rad/s: at the shaft that in the middle of the substep, foreseen; at the load the load's
+    double* angle;      // rad; at the load the load's
+    double* torque;     // N m: at the shaft and the load what saturation, dead band, delay and lag left of the command
     double* command;    // rad/s: at the command the one given, elsewhere no_command
     double time = 0.0;  // s since the record's start
 };

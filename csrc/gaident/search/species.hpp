@@ -83,6 +83,8 @@ private:
     static constexpr std::size_t least_in_species = 3;
     // A species whose cost is so many times another one's of no larger size is not fitted to the end.
     static constexpr double out_of_reach = 2.0;
+    // A new optimum of a species that costs less than so many times its best one is fitted to the end.
+    static constexpr double near_its_best = 1.5;
     // A species whose cost is within so many times the least is about as good as any.
     static constexpr double close_to_best = 1.2;
     // Largest share of the cost that a better optimum leaves: a smaller fall ends the local search, without another round.
@@ -206,7 +208,7 @@ private:
 
     void to_the_end(Level& level, std::size_t k) const {
         Fit& fit = level.best[k];
-        if (fit.cost < 1.5 * trial_.species[level.first + k].cost && fit.cost < level.within_reach)
+        if (fit.cost < near_its_best * trial_.species[level.first + k].cost && fit.cost < level.within_reach)
             fit = objective_.improved(fit, full_iterations);
     }
 

@@ -59,7 +59,7 @@ TORQUE_CONSTANT = DriveParameter(
 CONSTANTS = (TORQUE_CONSTANT.name,)
 """Parameters that are the motor's and not of a drive; a drive file gives them above its first section."""
 
-_PER_TURN = math.tau  # no decision: rad
+_PER_TURN = math.tau  # no decision: a unit; rad
 
 DRIVES: dict[str, DriveRow] = {
     "sinamics": DriveRow(

@@ -116,7 +116,7 @@ class Notch:
 
     def digital(self, period: float) -> _core.DigitalFilter:
         """The filter at the sample time `period` [s]; raises ControllerError where the frequency is too high for it."""
-        highest = 0.5 / period  # no decision: the Nyquist frequency
+        highest = 0.5 / period  # no decision: a formula: the Nyquist frequency
         if self.frequency >= highest:
             raise ControllerError(
                 f"frequency is {self.frequency:g} Hz: a notch of a controller with the period {period:g} s lies below "

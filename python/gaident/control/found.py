@@ -18,7 +18,7 @@ __all__ = ["NUMBER_STEP", "FoundNumbers", "loosened"]
 Vector = NDArray[np.float64]
 Matrix = NDArray[np.float64]
 
-NUMBER_STEP = 1e-3  # no decision: of a number of the controller, for a difference
+NUMBER_STEP = 1e-3  # no decision: the step of a difference; of a controller's number
 VARIANCE_RANK = 1e-9  # no decision: of the largest variance, what a sum is exact to
 
 

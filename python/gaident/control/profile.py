@@ -58,7 +58,7 @@ def _continued(line: Vector) -> Vector:
         a, b, c = end
         return [float(a + j * (a - b) + 0.5 * j * (j + 1) * (a - 2.0 * b + c)) for j in range(1, count + 1)]
 
-    return np.concatenate([beyond(line[:3], BEFORE)[::-1], line, beyond(line[:-4:-1], AFTER)])  # no decision: a parabola's lines
+    return np.concatenate([beyond(line[:3], BEFORE)[::-1], line, beyond(line[:-4:-1], AFTER)])  # no decision: a formula
 
 
 def _straight(line: Vector, every: int) -> Vector:
@@ -72,7 +72,7 @@ def _corners(before: Parabola, after: Parabola, noise: float) -> tuple[NDArray[n
     apart, slope, a = (y - x for x, y in zip(before, after, strict=True))
     seen = np.abs(a) > POLICY.corner_seen * noise
     a = np.where(seen, a, 1.0)
-    at = -slope / (2.0 * a)  # no decision: where a parabola turns
+    at = -slope / (2.0 * a)  # no decision: a formula: a parabola
     c = apart - slope**2 / (4.0 * a)
     return seen & (np.abs(c) < POLICY.corner_square * np.abs(a)) & (at >= 0.0) & (at <= 1.0), at
 

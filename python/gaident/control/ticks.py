@@ -27,6 +27,7 @@ __all__ = [
 
 Vector = NDArray[np.float64]
 
+AROUND = 5  # no decision: a formula: an interval, two before and two after
 WHOLE = 1e-6  # no decision: rounding of two decimal numbers that divide; more is no whole multiple
 
 
@@ -120,14 +121,14 @@ def _bends(steps: Vector) -> tuple[NDArray[np.intp], Vector, Vector]:
 
     Each of the ramps goes straight over two intervals, and the change over the interval is between theirs.
     """
-    if len(steps) < 5:  # no decision: two intervals before and two after
+    if len(steps) < AROUND:
         return np.zeros(0, dtype=np.intp), np.zeros(0), np.zeros(0)
-    earlier, before, here, after, later = np.lib.stride_tricks.sliding_window_view(steps, 5).T  # no decision: the same
+    earlier, before, here, after, later = np.lib.stride_tricks.sliding_window_view(steps, AROUND).T
     bend = np.abs(after - before)
     straight = np.maximum(np.abs(before - earlier), np.abs(later - after)) <= POLICY.ramp_straight * bend
     between = (np.minimum(before, after) < here) & (here < np.maximum(before, after))
     (at,) = np.nonzero(straight & between)
-    return at + 2, before[at], after[at]  # no decision: the third of five intervals
+    return at + AROUND // 2, before[at], after[at]
 
 
 def _ramps(line: Vector) -> Vector:

@@ -74,15 +74,15 @@ class Alignment:
 
     def summary(self) -> str:
         """Return the result as text, a few lines."""
-        rate = f"{self.rate * 1e6:+.1f} +- {self.rate_std * 1e6:.1f} ppm"  # no decision: how a number is printed
+        rate = f"{self.rate * 1e6:+.1f} +- {self.rate_std * 1e6:.1f} ppm"  # no decision: printed: a number
         if not self.rate_seen:
-            rate = f"no difference seen (to +- {2e6 * self.rate_std:.3g} ppm)"  # no decision: how a number is printed
+            rate = f"no difference seen (to +- {2e6 * self.rate_std:.3g} ppm)"  # no decision: printed: a number
         samples = self.uncertainty / self.record.dt
-        # no decision: how a number is printed
+        # no decision: printed: a number
         worst = "" if samples < 0.5 else "; too much for phase: log both with one clock where that matters"
         return (
             f"the second log begins {self.offset:.6g} +- {self.offset_std:.2g} s after the first (its clock's zero)\n"
-            f"rate of its clock: {rate}\n"  # no decision: how a number is printed
+            f"rate of its clock: {rate}\n"  # no decision: printed: a number
             f"correlation {self.correlation:.4f}, scale {self.gain:.4g}\n"
             f"time axis right to {self.uncertainty:.2g} s ({samples:.2g} samples){worst}\n"
             f"{len(self.record)} samples in common"
@@ -97,7 +97,7 @@ def align(
     on: str | tuple[str, str] | None = None,
     take: Sequence[str] | None = None,
     within: tuple[float, float] | None = None,
-    max_rate: float = 1e-3,  # no decision: an argument
+    max_rate: float = 1e-3,  # no decision: what an argument may be
 ) -> Alignment:
     """Bring the channels of a second log, which has a clock of its own, onto the first record's time axis.
 

@@ -29,7 +29,7 @@ from gaident.policy.table import POLICY
 
 __all__ = ["assemble", "channels_of"]
 
-SAID = 3  # no decision: columns that a sentence names
+SAID = 3  # no decision: printed: columns that a sentence names
 AS_THE_DRIVE = (
     "Neither velocity nor torque is logged: the velocity is the difference of the last two positions, as a drive forms it of its "
     "encoder, and the torque is what the given controller makes of it. What the drive's controller has beside that (filters, "

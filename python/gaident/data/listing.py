@@ -107,10 +107,10 @@ class Listing:
             rows.append(
                 (printable(c.name), printable(c.unit or "-"), str(c.samples), _number(c.lowest), _number(c.highest), step, remark)
             )
-        widths = [max(len(row[k]) for row in rows) for k in range(6)]  # no decision: the columns of the table that is printed
+        widths = [max(len(row[k]) for row in rows) for k in range(6)]  # no decision: printed: columns of a table
         lines = [f"{self.path}: {self.form}"]
         for row in rows:
-            # no decision: columns of the table that is printed
+            # no decision: printed: columns of a table
             cells = [cell.ljust(w) if k < 2 else cell.rjust(w) for k, (cell, w) in enumerate(zip(row[:6], widths, strict=True))]
             lines.append("  ".join([*cells, row[6]]).rstrip())
         if self.others:
@@ -207,7 +207,7 @@ class _Gathered:
         if not self.bad and finite.size < len(values):
             row = int(np.argmin(np.isfinite(values)))
             text = column.bad[1] if column.bad is not None else str(values[row])
-            # no decision: how much of a cell a message quotes
+            # no decision: printed: of a cell in a message
             self.bad = f"{'empty' if not text else f'no number: {text[:20]!r}'} at {block.place(row)}"
         if self.is_time and not self.irregular:
             self._pass_time(block, values)

@@ -29,7 +29,7 @@ from gaident.errors import ReadError
 
 __all__ = ["READERS", "Reader", "open_log", "read", "read_columns"]
 
-_HEAD = 4096  # no decision: bytes that tell a format
+_HEAD = 4096  # no decision: a format: bytes that tell it
 
 
 @dataclass(frozen=True)

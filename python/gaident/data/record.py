@@ -42,7 +42,7 @@ CHANNELS = ("command", "velocity", "torque", "position", "position_command")
 """The channels of a record, in the order of its arguments."""
 
 SCHEMA = "gaident/record"
-SCHEMA_VERSION = 1  # no decision: the version of a format
+SCHEMA_VERSION = 1  # no decision: a format: its version
 
 # A time given as 0.3 s falls on sample 3 of dt = 0.1 s although 0.3 / 0.1 is 2.9999999999999996.
 _TIME_SLACK = 1e-6  # no decision: rounding of two decimal numbers
@@ -357,7 +357,7 @@ class Record:
             Where the data are something else or of a newer schema.
         """
         check_schema(data, SCHEMA, SCHEMA_VERSION)
-        # no decision: channels that the first version of the format had
+        # no decision: a format: channels of its first version
         missing = [key for key in ("dt", "name", *CHANNELS[:4]) if key not in data]
         if missing:
             raise RecordError(f"the saved record lacks {', '.join(missing)}; save it again")

@@ -16,7 +16,7 @@ __all__ = ["SLOW_STEP", "TimeAxis", "even_step", "stamp_unit", "time_column"]
 SLOW_STEP = 0.5  # no decision: what is asked and said; s, longer steps of a column without a unit may be milliseconds
 
 _BLOCK = 64  # no decision: memory; stamps of a block
-_DIGITS = 16  # no decision: decimals of a double
+_DIGITS = 16  # no decision: rounding: decimals of a double
 _SINGLE_PRINTED = 6e-9  # no decision: rounding
 """Relative error of a single-precision number printed with its nine digits."""
 
@@ -98,7 +98,7 @@ def _check_given(table: LogTable, column: Column, found: float, second: float, d
     if abs(found - dt) <= POLICY.clock_jitter * dt:
         return
     unit = next(
-        # no decision: a hint in a message
+        # no decision: printed: a hint in a message
         (name for name, size in (("ms", 1e-3), ("us", 1e-6), ("min", 60.0)) if abs(found * size / dt - 1) < 0.01),
         None,
     )
@@ -116,7 +116,7 @@ _EPOCHS = (
     (6.3e14, 4.2e15, 1e-6),
     (6.3e17, 4.2e18, 1e-9),
     (1.22e17, 1.58e17, 1e-7),
-)  # no decision: dates
+)  # no decision: a format: dates
 
 
 def stamp_unit(first: float) -> float:

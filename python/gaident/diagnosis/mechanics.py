@@ -39,7 +39,7 @@ MECHANICS = {
     "ground_resonance": "Hz",
 }
 """Names and units; inertia and viscous friction are of the whole axis, the last two of a spring between it and the ground."""
-WHOLE = 2  # no decision: of these, what every axis has
+WHOLE = 2  # no decision: how many of these every axis has
 
 
 def mechanics_of(objective: Objective, fit: Fit) -> dict[str, Estimate]:

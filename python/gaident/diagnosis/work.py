@@ -134,7 +134,7 @@ class Work:
             self.objective,
             self.scales,
             self.idn.model,
-            lambda objective, most: selected(objective, *rest, most=min(most, self.most)),
+            lambda objective, most, beside: selected(objective, *rest, min(most, self.most), beside),
         )
         self.notes += older
         self.note(0.85, "looking for what is left")

@@ -7,7 +7,7 @@ from pathlib import Path
 
 __all__ = ["head_of", "line_of", "plain", "quoted"]
 
-_COMMENT = 26  # no decision: column where comments begin; column of a page
+_COMMENT = 26  # no decision: printed: where comments begin
 
 
 def head_of(log: str) -> str:

@@ -217,7 +217,7 @@ def _is_proposal(path: str) -> bool:
     """Whether a file is a command as `gaident experiment`, --next-command or a report writes it."""
     try:
         with open(path, "rb") as stream:
-            # no decision: how such a file begins
+            # no decision: a format: how such a file begins
             return _PROPOSAL.fullmatch(stream.readline(64)) is not None
     except OSError:
         return False
@@ -250,7 +250,7 @@ def read_drive_file(path: str, axis: str | None = None) -> dict[str, dict[str, A
 
 def _parsed(path: str) -> dict[str, Any]:
     """What a TOML file contains. Raises ReadError."""
-    if sys.version_info >= (3, 11):  # no decision: a version of Python
+    if sys.version_info >= (3, 11):  # no decision: what an argument may be: a version of Python
         import tomllib
     else:
         import tomli as tomllib

@@ -53,7 +53,7 @@ def unit(value: object, name: str) -> str | float:
 
 def pair(value: object, name: str) -> tuple[float, float]:
     if not isinstance(value, Sequence) or isinstance(value, str) or len(value) != 2:
-        # no decision: what a decimal comma makes of a pair
+        # no decision: a format: what a decimal comma makes of a pair
         hint = ", with decimal points" if isinstance(value, list) and len(value) in (3, 4) else ""
         raise ReadError(f"{name} is {value!r}: give a pair{hint}, {name} = [lowest, highest]")
     low, high = (number(v, name) for v in value)

@@ -56,8 +56,8 @@ def with_content(listing: Listing, guess: Guess, values: Mapping[str, NDArray[np
     if "velocity" in guess.channels:
         return guess
     taken = {c.name for channel, c in guess.channels.items() if channel != "position"} | {guess.time.name if guess.time else ""}
-    # no decision: a shorter one shows no derivative
-    moving = [c for c in listing.columns if c.samples > 20 and c.lowest != c.highest and not c.note and not c.rises_evenly]
+    enough = [c for c in listing.columns if c.samples > POLICY.derivative_samples]
+    moving = [c for c in enough if c.lowest != c.highest and not c.note and not c.rises_evenly]
     longest = max((c.samples for c in moving), default=0)
     candidates = {c.name: values[c.name] for c in moving if c.samples == longest and c.name not in taken and c.name in values}
     pair = position_and_velocity(candidates, 1.0) if len(candidates) <= POLICY.paired_columns else None

@@ -23,7 +23,7 @@ INTEGRAL_TIME, INERTIA = "tn", "total_inertia"
 
 Factor = tuple[float, str]  # to SI, and the constant that it is multiplied by; "": none
 _LISTED = 10  # no decision: how many units a message names
-_RPM = math.tau / 60.0  # no decision: rad/s
+_RPM = math.tau / 60.0  # no decision: a unit; rad/s
 _CURRENTS: dict[str, Factor] = {"A": (1.0, "torque_constant"), "mA": (1e-3, "torque_constant")}
 _SHARES_OF_RATED: dict[str, Factor] = {"%": (1e-2, "rated_torque"), "‰": (1e-3, "rated_torque")}
 _TORQUES: dict[str, Factor] = {"N m": (1.0, ""), **_CURRENTS, **_SHARES_OF_RATED, "mN m": (1e-3, "")}

@@ -104,12 +104,12 @@ def effective_samples(*errors: Vector) -> float:
     squares = products[1 : 1 + longest // POLICY.samples_per_lag] ** 2 / products[0] ** 2
     chance = (count - np.arange(1, len(squares) + 1)) / count**2  # what rho^2 of white errors is in the mean
     swinging = float(np.sum(squares - chance))
-    memory = 1.0 + 2.0 * slow  # no decision: as below
+    memory = 1.0 + 2.0 * slow  # no decision: a formula: as below
     if swinging > max(slow, POLICY.swings):
         lowest = sum(float(np.sum(np.abs(np.fft.rfft(e - mean)[1 : 1 + POLICY.spectrum_lines]) ** 2)) for e in errors)
         spectral = lowest / (products[0] * sum(min(POLICY.spectrum_lines, len(e) // 2) * len(e) for e in errors) / count)
-        memory = max(1.0 + 2.0 * swinging, spectral)  # no decision: as below
-    return float(np.clip(count / memory, 1.0, count))  # no decision: variances of means of correlated samples
+        memory = max(1.0 + 2.0 * swinging, spectral)  # no decision: a formula: as below
+    return float(np.clip(count / memory, 1.0, count))  # no decision: a formula: variances of means of correlated samples
 
 
 class Specification(NamedTuple):

@@ -147,7 +147,7 @@ class DataSet:
 
     def steps_of(self, substeps: int | None) -> int | None:
         """Substeps of a sample of a record made `ready`, from those of a sample."""
-        return max(substeps // 2, 1) if self.differenced and substeps is not None else substeps  # no decision: half a sample
+        return max(substeps // 2, 1) if self.differenced and substeps is not None else substeps  # no decision: a formula
 
     @property
     def differenced(self) -> bool:  # the velocity is the difference of the angle from each line of the log to the next

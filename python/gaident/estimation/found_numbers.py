@@ -151,7 +151,7 @@ def refined(
         if found.covariance is not None:
             A, b = A + s2 * np.eye(len(A)), b + s2 * found.deviations_off
         step = -inverse_of(A) @ b
-        for part in (1.0, 0.3, 0.1):  # no decision: of a step
+        for part in (1.0, 0.3, 0.1):  # no decision: of a solver: shares of a step
             to = moved(here.predictor.data, part * step @ found.directions)
             trial = here if to is None else _under(objective, to, here)
             fall = _cost(here, s2) - _cost(trial, s2)

@@ -75,6 +75,11 @@ class Fit:
         """The effects in the model, in the order in which they were added."""
         return self.hypothesis.effects
 
+    @property
+    def impacts(self) -> bool:
+        """Whether one of its effects has impacts."""
+        return any(t.impacts for t in self.parameters.terms)
+
     @cached_property
     def key(self) -> Hashable:
         """The same for fits of the same numbers."""

@@ -1,4 +1,4 @@
-"""Fits of one hypothesis: least squares from a start, noise re-estimated, and a global search where the cost is multimodal."""
+"""Fits of one hypothesis: least squares from a start, noise re-estimated."""
 
 from __future__ import annotations
 
@@ -10,13 +10,12 @@ from gaident.estimation.objective import Fit, Hypothesis, Objective
 from gaident.estimation.projection import WORST
 from gaident.policy.table import POLICY
 
-__all__ = ["evolved", "fit", "negligible", "reestimated", "scored"]
+__all__ = ["fit", "negligible", "reestimated", "scored"]
 
 Vector = NDArray[np.float64]
 Matrix = NDArray[np.float64]
 
-NEARBY = 0.15, 0.3, 0.7  # no decision: of a base parameter, of its unit at least, of a step of an effect: where it is searched
-DAMPINGS = 10.0 ** np.arange(-3.0, 5.0)  # no decision: times the damping of the step before
+DAMPINGS = 10.0 ** np.arange(-3.0, 5.0)  # no decision: of a solver; times the damping of the step before
 NEGLIGIBLE_FALL = 0.02  # no decision: of the noise variance: a fall of the cost by less changes no decision
 
 
@@ -126,33 +125,3 @@ def _reestimated(objective: Objective, found: Fit, iterations: int) -> Fit:
         if found.converged and found.noise.key == noise.key == WHITE.key:
             break
     return best
-
-
-def evolved(objective: Objective, found: Fit, generations: int) -> Fit:
-    """Differential evolution around a fit (Storn and Price 1997): a stop or an impact more or less makes the cost multimodal."""
-    from scipy.optimize import differential_evolution
-
-    hypothesis, parameters = found.hypothesis, found.parameters
-    limits, steps = parameters.limits(), parameters.steps()
-    part, least, of_step = NEARBY
-    reach = np.where(np.arange(parameters.size) < parameters.base, part * np.maximum(np.abs(found.x), least), of_step * steps)
-    reach[0] = part  # ln K
-    moved = np.flatnonzero(steps > 0.0)
-    low, high = np.maximum(found.x - reach, limits[0])[moved], np.minimum(found.x + reach, limits[1])[moved]
-    if np.any(low >= high) or not np.all(np.isfinite(found.x)):
-        return found
-    # no decision: inside of the bounds
-    start = low + (high - low) * np.clip((found.x[moved] - low) / (high - low), 1e-6, 1.0 - 1e-6)
-
-    def costs(columns: Matrix) -> Vector:
-        X = np.repeat(found.x[None, :], columns.shape[1], axis=0)
-        X[:, moved] = columns.T
-        return np.log(objective.costs(hypothesis, X, WHITE))
-
-    best = differential_evolution(
-        costs, list(zip(low, high, strict=True)), popsize=POLICY.population, maxiter=generations, x0=start, rng=0,
-        vectorized=True, updating="deferred", polish=False, tol=1e-4, mutation=(0.4, 0.9), recombination=0.9,
-    )  # fmt: skip
-    x = found.x.copy()
-    x[moved] = best.x
-    return fit(objective, hypothesis, x, WHITE, POLICY.usual)

@@ -27,7 +27,7 @@ Matrix = NDArray[np.float64]
 def with_middles(rec: Record) -> Record:
     """The record with twice the samples: its torque as it is held, everything else half way between."""
     n = 2 * len(rec)
-    at = 0.5 * np.arange(n)  # no decision: the middle
+    at = 0.5 * np.arange(n)  # no decision: a formula: the middle
 
     def between(name: str, x: NDArray[np.float64]) -> NDArray[np.float64]:
         if name != "torque":
@@ -36,7 +36,7 @@ def with_middles(rec: Record) -> Record:
         return np.asarray(np.interp(at + 0.25, np.arange(len(rec)), x) if sampled_between(rec) else np.repeat(x, 2))
 
     channels: dict[str, Any] = {name: between(name, x) for name, x in rec.channels()}
-    half = 0.5 * rec.dt  # no decision: half the sample
+    half = 0.5 * rec.dt  # no decision: a formula: half the sample
     return rec.with_channels(dt=half, torque_is=kind_of_held(rec, half), **channels)
 
 
@@ -44,5 +44,5 @@ def means(W: Matrix) -> Matrix:
     """Rows of means over each sample (m, n) of velocities with the middle of each sample (m, 2 n); the first as it is."""
     ends, middles = W[:, ::2], W[:, 1::2]
     seen = ends.copy()
-    seen[:, 1:] = (ends[:, :-1] + 4.0 * middles[:, :-1] + ends[:, 1:]) / 6.0  # no decision: Simpson's rule
+    seen[:, 1:] = (ends[:, :-1] + 4.0 * middles[:, :-1] + ends[:, 1:]) / 6.0  # no decision: a formula: Simpson's rule
     return seen

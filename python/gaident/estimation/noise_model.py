@@ -34,7 +34,7 @@ __all__ = ["DIFFERENCED", "HIGHEST", "WHITE", "NoiseFilter", "ShaftNoise", "auto
 Vector = NDArray[np.float64]
 Matrix = NDArray[np.float64]
 
-HIGHEST = 20  # no decision: BIC takes the order; order of an autoregression alone
+HIGHEST = 20  # no decision: a grid: BIC takes the order; order of an autoregression alone
 ON_TOP = 6  # no decision: and of one behind a shaft's noise: what the sensor does
 TAUS = 2.5 * 2.0 ** np.arange(10)  # no decision: a grid; samples
 SIZES = 2.0 ** np.arange(-12.0, 6.0)  # no decision: a grid

@@ -155,6 +155,10 @@ class Counter:
     def __init__(self) -> None:
         self.simulations = 0
 
+    def add(self, simulations: int) -> None:
+        """So many more."""
+        self.simulations += simulations
+
 
 def _of_error(hypothesis: Hypothesis, x: Vector) -> Hashable:
     """The key of a raw error."""
@@ -193,7 +197,7 @@ class Objective:
 
     def errors(self, hypothesis: Hypothesis, X: Matrix) -> Matrix:
         """Rows of raw errors: measured minus simulated velocity [rad/s]."""
-        self.counter.simulations += len(X)
+        self.counter.add(len(X))
         return _core.errors_of(self.measured, hypothesis.predictor.velocities(hypothesis.parameters, X), LOST)
 
     def error(self, fit: Fit) -> Vector:

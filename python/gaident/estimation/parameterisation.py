@@ -58,12 +58,12 @@ def mechanism(model: Model) -> Vector:
 def described(scales: Scales, model: Model) -> Scales:
     """Scales with what the mechanism of a model says."""
     values = mechanism(model)
-    if len(values) < 6:  # no decision: the count of a mechanism's numbers
+    if len(values) < 6:  # no decision: how many numbers a mechanism has
         return replace(scales, two_masses=False)
     K, a, e1, e0, _, f0 = values
     JM = 1.0 / abs(K)
     # sum of pairwise A = K_G (1/J_M + 1/J_L) and prod B = K_G/J_L, dampings left out
-    load = max(e0 + a * e1 - f0, 1e-3 * abs(e0))  # no decision: a scale
+    load = max(e0 + a * e1 - f0, 1e-3 * abs(e0))  # no decision: a unit: a scale
     KG = JM * load
     return replace(scales, two_masses=True, stiffness=KG, resonance=float(np.sqrt(abs(e0))))
 
@@ -88,14 +88,14 @@ class Parameterisation:
         Its scales are the given ones with the values of the model's mechanism.
         """
         values = mechanism(model)
-        floor = 2.0 / scales.duration  # no decision: a scale
+        floor = 2.0 / scales.duration  # no decision: a unit: a scale
         units = [max(abs(values[1]), floor)]
-        if len(values) == 3:  # no decision: the count of a mechanism's numbers
+        if len(values) == 3:  # no decision: how many numbers a mechanism has
             units.append(max(abs(values[2]), floor**2))
-        for _, e0 in values[2:].reshape(-1, 2) if len(values) > 3 else ():  # no decision: a count
+        for _, e0 in values[2:].reshape(-1, 2) if len(values) > 3 else ():  # no decision: how many
             w = max(np.sqrt(abs(e0)), floor)
             units += [w, w * w]
-        masses = 2 if len(values) > 3 else 1  # no decision: the count of a mechanism's numbers
+        masses = 2 if len(values) > 3 else 1  # no decision: how many numbers a mechanism has
         starts = tuple(model.order if m else 0 for m in moving)
         return cls(masses, tuple(float(u) for u in units), (), starts, described(scales, model))
 
@@ -186,7 +186,7 @@ class Parameterisation:
     def base_values(self, X: Matrix) -> Matrix:
         """Rows [K, a, ...] of rows of x."""
         values = np.empty((len(X), self.base))
-        values[:, 0] = np.exp(np.minimum(np.maximum(X[:, 0], -300.0), 300.0))  # no decision: what a double can be
+        values[:, 0] = np.exp(np.minimum(np.maximum(X[:, 0], -300.0), 300.0))  # no decision: rounding: what a double can be
         np.multiply(X[:, 1 : self.base], self._units, out=values[:, 1:])
         return values
 

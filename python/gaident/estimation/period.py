@@ -10,7 +10,7 @@ At constant speed a hum of one frequency is such a wave too.
 So P must explain more than any frequency in time, by the margin of two rivals.
 
 The strongest wave may be a harmonic of the pitch: where other harmonics of a longer pitch stand beside it, that pitch is taken.
-A pitch is a round number: of all lengths within two deviations the one with the fewest digits.
+A pitch is a round number: of all lengths within `round_deviations` the one with the fewest digits.
 """
 
 from __future__ import annotations
@@ -88,7 +88,7 @@ def period_of_place(records: Sequence[Record]) -> float | None:
     left = _Left(errors, tuple(bases))
     travel = max(float(np.ptp(x)) for x in places)
     speed = float(np.median(np.abs(np.concatenate([r.of(("viscous_by_direction",)).sum(axis=1) for r in rows]))))
-    band = 0.5 * POLICY.seen_band / (factor * dt)  # no decision: half the sampling frequency
+    band = 0.5 * POLICY.seen_band / (factor * dt)  # no decision: a formula: half the sampling frequency
     low, high = POLICY.seen_path / travel, band / speed
     if not low < high or not left.power > 0.0:
         return None
@@ -112,7 +112,7 @@ def period_of_place(records: Sequence[Record]) -> float | None:
 
 def _counts(before: _Left, after: _Left, tried: int) -> bool:
     """Whether a wave is there: two amplitudes and its length, the best of so many."""
-    gain = gained(before.power, after.power, effective_samples(*after.errors), 3)  # no decision: numbers of a wave
+    gain = gained(before.power, after.power, effective_samples(*after.errors), 3)  # no decision: how many numbers a wave has
     chance = 2.0 * math.log(tried)  # no decision: 2 ln m, what the best of m costs, see `Term.search_cost`
     return gain - chance > POLICY.dependence_gain and before.power - after.power > POLICY.material_share * before.power
 
@@ -145,9 +145,9 @@ def _whole(left: _Left, places: Sequence[Vector], wave: float, travel: float) ->
 
 
 def _round(length: float, std: float) -> float:
-    """The length with the fewest digits within two standard deviations."""
-    for digits in range(1, 9):  # no decision: how a length is written
+    """The length with the fewest digits within its deviations."""
+    for digits in range(1, 9):  # no decision: printed: digits of a length
         written = float(f"{length:.{digits}g}")
-        if abs(written - length) <= 2.0 * std:  # no decision: as above
+        if abs(written - length) <= POLICY.round_deviations * std:
             return written
     return length

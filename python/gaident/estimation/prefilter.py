@@ -72,7 +72,7 @@ class Prefilter:
     def _sections(self) -> Any:
         from scipy.signal import butter
 
-        return butter(self.order, 2.0 * self.cutoff * self.dt, output="sos")
+        return butter(self.order, 2.0 * self.cutoff * self.dt, output="sos")  # no decision: a formula
 
     @cached_property
     def _gain(self) -> float:

@@ -38,7 +38,7 @@ class Discretised:
     @property
     def first_response(self) -> float:
         x, largest = self.B, abs(self.D)
-        for _ in range(3):  # no decision: samples of a response
+        for _ in range(3):  # no decision: how many samples of a response it takes
             largest = max(largest, abs(float((self.C @ x).real)))
             x = self.A @ x
         return largest
@@ -95,7 +95,7 @@ def disturbed(plant: Discretised, controller: PI | None, dt: float) -> Discretis
     A[:m, :m], A[:m, m], A[m, m] = plant.A, plant.B, 1.0
     A[:m] -= k * np.outer(plant.B, C)
     A[m] -= 2.0 * h * C
-    B = np.append((1.0 - k * D) * plant.B, -2.0 * h * D)
+    B = np.append((1.0 - k * D) * plant.B, -2.0 * h * D)  # no decision: a formula
     return Discretised(A, B, C, D)
 
 

@@ -22,7 +22,7 @@ Matrix = NDArray[np.float64]
 Natural = Callable[[Matrix], Matrix]
 Rows = list[tuple[float, ...]]
 
-PHASE = 1.0  # no decision: rad; by so much a phase is off where its two components are off by the whole amplitude
+PHASE = 1.0  # no decision: a formula: rad; by so much a phase is off where its two components are off by the amplitude
 
 
 @dataclass(frozen=True)

@@ -28,7 +28,7 @@ from gaident.results.estimate import Estimate
 
 __all__ = ["age_part", "controller_part", "covariance_of", "estimates_of"]
 
-BLOCKS = 8  # no decision: of a jackknife, how finely a deviation is known
+BLOCKS = 8  # no decision: how many parts of a jackknife
 
 Vector = NDArray[np.float64]
 Matrix = NDArray[np.float64]
@@ -56,7 +56,7 @@ def _covariance(objective: Objective, fit: Fit) -> Matrix:
 
 def _of_the_errors(objective: Objective, fit: Fit) -> Matrix:
     cov = _at_one_point(objective, fit)
-    if not any(t.impacts for t in fit.parameters.terms):
+    if not fit.impacts:
         return cov
     local = np.sqrt(np.diag(cov))
     known = (local > 0.0) & np.isfinite(local)

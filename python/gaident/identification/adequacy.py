@@ -15,15 +15,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from gaident.identification.noise import Autoregression, chi2_tail, ljung_box_of
+from gaident.identification.noise import Autoregression, ljung_box_of
 from gaident.policy.table import POLICY
 from gaident.results.adequacy import Adequacy
 
 __all__ = ["Sums", "assess", "independence_p", "regressor_lags", "white_lags"]
 
 Vector = NDArray[np.float64]
-
-INPUT_LAGS = (0, 1, 2, 4, 8, 16, 32)  # no decision: of the input, which a test looks at
 
 
 @dataclass(frozen=True)
@@ -50,13 +48,16 @@ def regressor_lags(lengths: Sequence[int], open_loop: bool) -> list[int]:
     It acts from the next sample on, and if a controller made it, it carries the noise of its own sample:
     lag 0 would then be correlated with the residual by construction and is left out.
     """
-    # no decision: lags that a record can show; the test has a level
-    return [k for k in INPUT_LAGS if k < min(lengths) // 4 and not (open_loop and k == 0)]
+    lags, k = [] if open_loop else [0], 1
+    while k <= POLICY.input_lag:
+        lags.append(k)
+        k *= 2
+    return [k for k in lags if k < min(lengths) // POLICY.samples_per_input_lag]
 
 
 def white_lags(lengths: Sequence[int]) -> int:
     """Lags of the whiteness test."""
-    return min(20, sum(lengths) // 5)  # no decision: lags that a record can show; the test has a level
+    return min(POLICY.white_lags, sum(lengths) // POLICY.samples_per_white_lag)
 
 
 def assess(s: Sums) -> Adequacy:
@@ -105,8 +106,14 @@ def independence_p(sums: Vector, own: int, samples: int) -> float:
     dof = samples - len(basis) - m
     if dof < 1 or not left > 0.0:
         return 1.0 if not explained > 0.0 else 0.0
-    # F(m, dof) by its chi2 limit with the finite-sample correction dof ln(1 + m F / dof).
-    return chi2_tail((dof + 0.5 * m) * math.log1p(explained / left), m)
+    return _f_tail((explained / m) / (left / dof), m, dof)
+
+
+def _f_tail(x: float, m: int, dof: int) -> float:
+    """P(F > x) for m and dof degrees of freedom."""
+    from scipy.special import fdtrc
+
+    return float(fdtrc(m, dof, x))
 
 
 def _orthonormal(gram: Vector) -> Vector:

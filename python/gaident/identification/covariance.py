@@ -129,13 +129,13 @@ def estimates(model: Model, cov: Matrix, at_bound_core: Sequence[bool]) -> dict[
         elif name.endswith("_e1"):
             stem = name[: -len("_e1")]
             e1, e0 = float(values[i]), float(values[i + 1])
-            w, im = np.sqrt(e0), np.sqrt(max(e0 - 0.25 * e1**2, 1e-300))  # no decision: roots of a quadratic
+            w, im = np.sqrt(e0), np.sqrt(max(e0 - 0.25 * e1**2, 1e-300))  # no decision: a formula: the roots of a quadratic
             add(f"{stem}_real", -0.5 * e1, {i: -0.5}, "rad/s", bound[i], w)
-            add(f"{stem}_imaginary", float(im), {i: -0.25 * e1 / im, i + 1: 0.5 / im}, "rad/s", bound[i + 1], float(w))
+            of_imaginary = {i: -0.25 * e1 / im, i + 1: 0.5 / im}  # no decision: a formula
+            of_damping = {i: 0.5 / w, i + 1: -0.25 * e1 / w**3}  # no decision: a formula
+            add(f"{stem}_imaginary", float(im), of_imaginary, "rad/s", bound[i + 1], float(w))
             add(f"{stem}_frequency", float(w), {i + 1: 0.5 / w}, "rad/s", bound[i + 1], float(w))
-            add(
-                f"{stem}_damping", float(0.5 * e1 / w), {i: 0.5 / w, i + 1: -0.25 * e1 / w**3}, "1", bound[i] or bound[i + 1], 1.0
-            )
+            add(f"{stem}_damping", float(0.5 * e1 / w), of_damping, "1", bound[i] or bound[i + 1], 1.0)
         elif not name.endswith("_e0"):
             add(name, -float(values[i]), {i: -1.0}, "rad/s", bound[i], float(values[i]))
     return found
@@ -158,4 +158,5 @@ def usable_covariance(model: Model, cov: Matrix) -> Matrix | None:
         return None
     size = np.sqrt(np.diag(fixed))
     correlation = fixed / np.outer(size, size)
-    return fixed if np.linalg.eigvalsh(0.5 * (correlation + correlation.T))[0] > -1e-9 else None  # no decision: a symmetric part
+    # no decision: a formula: a symmetric part
+    return fixed if np.linalg.eigvalsh(0.5 * (correlation + correlation.T))[0] > -1e-9 else None

@@ -37,10 +37,10 @@ Complex = NDArray[np.complex128]
 
 WINDOWS = 8  # no decision: at least, half-overlapping: the resolution of a spectrum, and its deviations are reckoned with it
 LONGEST = 4096  # no decision: samples of a window: the resolution of a spectrum, and its deviations are reckoned with it
-PER_OCTAVE = 12  # no decision: frequencies kept
+PER_OCTAVE = 12  # no decision: a grid: frequencies of a curve
 
-SAME = np.array([1.0, 4.0 / 9.0, 1.0 / 36.0])  # no decision: of a Hann window
-NEXT = np.array([1.0 / 36.0, (4.0 / (9.0 * np.pi)) ** 2, 1.0 / 144.0, (4.0 / (45.0 * np.pi)) ** 2])  # no decision: Hann
+SAME = np.array([1.0, 4.0 / 9.0, 1.0 / 36.0])  # no decision: a formula: a Hann window
+NEXT = np.array([1.0 / 36.0, (4.0 / (9.0 * np.pi)) ** 2, 1.0 / 144.0, (4.0 / (45.0 * np.pi)) ** 2])  # no decision: a formula
 """|rho|^2 of white noise behind Hann windows, 0, 1, 2, ... frequencies apart: in one window, and in the next one."""
 
 
@@ -52,12 +52,12 @@ def response_of(rec: Record, model: Model, controller: PI | None = None) -> Resp
     measured = measured_response(rec, controller)
     with np.errstate(over="ignore", invalid="ignore"):
         done = run(model, rec, controller)
-    # no decision: a curve that is drawn; beyond, it runs away
+    # no decision: drawn: beyond, a curve runs away
     sound = bool(np.all(np.isfinite(done.velocity)) and np.abs(done.velocity).max() < 1e3 * np.abs(rec.velocity).max())
     low, high = float(measured.frequency[0]), float(measured.frequency[-1])
     fine = np.geomspace(low, high, 600)
     roots = [r for r in (*model.poles, *model.zeros) if r.imag > 0.0]
-    # no decision: points of a curve that is drawn
+    # no decision: drawn: points of a curve
     near = [(r.imag + max(abs(r.real), 1e-6 * r.imag) * np.linspace(-5.0, 5.0, 61)) / (2.0 * np.pi) for r in roots]
     fine = np.unique(np.concatenate([fine, *(f[(f > low) & (f < high)] for f in near)]))
     return Responses(
@@ -124,7 +124,7 @@ def _averages(windows: int, count: NDArray[np.intp]) -> Vector:
 def _estimate(u: Vector, w: Vector, command: Vector | None, dt: float) -> FrequencyResponse:
     """From torque u to velocity w; a command that never changes is no instrument."""
     n = len(w)
-    size = max(16, min(2 * n // (WINDOWS + 1), LONGEST))  # no decision: the resolution of a spectrum
+    size = max(16, min(2 * n // (WINDOWS + 1), LONGEST))  # no decision: a grid: the lines of a spectrum
     starts = range(0, n - size + 1, max(1, size // 2))
     instrument = command is not None and not _constant(command)
     window = np.hanning(size + 2)[1:-1]
@@ -149,7 +149,7 @@ def _estimate(u: Vector, w: Vector, command: Vector | None, dt: float) -> Freque
     averages = _averages(len(starts), count)
     with np.errstate(divide="ignore", invalid="ignore"):
         value = wr / ur
-        # no decision: a square that is written out
+        # no decision: a formula: a square that is written out
         unexplained = np.maximum(ww - 2.0 * (value.conj() * wu).real + np.abs(value) ** 2 * uu, 0.0)
         std = np.sqrt(unexplained * rr / np.maximum(averages - 1.0, 0.0)) / np.abs(ur)
         coherence = np.minimum(np.abs(wr) ** 2 / (ww * rr), np.abs(ur) ** 2 / (uu * rr))

@@ -314,7 +314,7 @@ class _Work:
         products, largest = self.experiment.residual_sums(c.fit, max(order, adequacy.white_lags(self.lengths)))
         noise = autoregression_of(products[: order + 1], self.samples)
         lags = adequacy.regressor_lags(self.lengths, self.controller is None)
-        plain, coloured, white = self.experiment.fit_sums(c.fit, noise.phi, lags, 0.01 * largest)
+        plain, coloured, white = self.experiment.fit_sums(c.fit, noise.phi, lags, POLICY.no_direction * largest)
         sums = adequacy.Sums(products, white, len(plain), self.lengths, noise, self.quiet)
         return _Assessed(c, float(products[0]), noise, plain, coloured, adequacy.assess(sums))
 

@@ -118,4 +118,4 @@ def correlation_of(left: Vector, own: NDArray[np.intp]) -> float:
     pairs = own[1:] == own[:-1]
     power = float(np.sum(d**2))
     together = float(np.sum((d[1:] * d[:-1])[pairs]))
-    return float(np.clip(together / power, 0.0, 0.999)) if power > 0.0 else 0.0  # no decision: what a sum can be divided by
+    return float(np.clip(together / power, 0.0, 0.999)) if power > 0.0 else 0.0  # no decision: no division by 0

@@ -20,7 +20,7 @@ __all__ = ["Autoregression", "autocorrelation", "autoregression_of", "chi2_tail"
 
 Vector = NDArray[np.float64]
 
-MAX_ORDER = 30  # no decision: BIC takes the order
+MAX_ORDER = 30  # no decision: a grid: BIC takes the order
 DIRECT = 40  # no decision: lags up to which products are quicker than a transform
 
 

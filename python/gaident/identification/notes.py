@@ -56,7 +56,7 @@ def warnings_of(
 
 def unseen_notes(mechanics: OneMass | TwoMass | None, dt: float) -> list[str]:
     """A sentence on a resonance above what the lines of the log show, dt [s] apart."""
-    highest = POLICY.seen_band * 0.5 / dt  # no decision: half the sampling frequency
+    highest = POLICY.seen_band * 0.5 / dt  # no decision: a formula: half the sampling frequency
     if not isinstance(mechanics, TwoMass) or not mechanics.resonance / math.tau > highest:
         return []
     return [

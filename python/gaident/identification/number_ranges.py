@@ -22,9 +22,9 @@ def grid_of(field: str, period: float) -> list[float]:
     grids = {
         "time_constant": np.log(TIME_CONSTANTS * period),
         "frequency": np.log(FREQUENCIES / period),
-        "numerator_damping": np.array([0.1, 0.4]),
-        "denominator_damping": np.log(np.array([0.7, 1.5])),
-        "gain": np.log(np.geomspace(1.0, 300.0, POLICY.grid)),
+        "numerator_damping": np.array([0.1, 0.4]),  # no decision: a start
+        "denominator_damping": np.log(np.array([0.7, 1.5])),  # no decision: a start
+        "gain": np.log(np.geomspace(1.0, 300.0, POLICY.grid)),  # no decision: a start
         "velocity_feedforward": np.array([0.0, 1.0]),
     }
     return list(grids[field])
@@ -32,16 +32,26 @@ def grid_of(field: str, period: float) -> list[float]:
 
 def range_of(field: str, period: float) -> tuple[float, float]:
     """(lowest, highest) of a number, as the search moves it."""
-    return {
-        "time_constant": (float(np.log(0.05 * period)), float(np.log(1e5 * period))),
-        "frequency": (float(np.log(1e-4 / period)), float(np.log(0.495 / period))),
-        "numerator_damping": (0.0, 5.0),
-        "denominator_damping": (float(np.log(5e-3)), float(np.log(10.0))),
-        "gain": (float(np.log(1e-3)), float(np.log(1e5))),
-        "kp": (SMALLEST, np.inf),
-        "ki": (0.0, np.inf),
-        "command_weight": (0.0, np.inf),
-    }.get(field, (-np.inf, np.inf))
+    match field:
+        case "time_constant":
+            return _logarithms(POLICY.filter_fastest * period, POLICY.filter_slowest * period)
+        case "frequency":
+            return _logarithms(POLICY.notch_slowest / period, POLICY.notch_fastest / period)
+        case "numerator_damping":
+            return 0.0, POLICY.most_zero_damping
+        case "denominator_damping":
+            return _logarithms(POLICY.least_pole_damping, POLICY.most_pole_damping)
+        case "gain":
+            return _logarithms(POLICY.least_position_gain, POLICY.most_position_gain)
+        case "kp":
+            return SMALLEST, np.inf
+        case "ki" | "command_weight":
+            return 0.0, np.inf
+    return -np.inf, np.inf
+
+
+def _logarithms(low: float, high: float) -> tuple[float, float]:
+    return float(np.log(low)), float(np.log(high))
 
 
 def inverse(J: Matrix) -> tuple[Matrix, Matrix]:

@@ -64,7 +64,7 @@ def derive_space(records: Sequence[Record], controller: PI | None) -> SearchSpac
             raise SpaceError(
                 f"the {what} of the record is constant: nothing can be identified from it; use a record in which the drive moves"
             )
-    # no decision: what a double can invert
+    # no decision: rounding: what a double can invert
     rigid = float(np.linalg.solve(gram, right)[0]) if np.linalg.cond(gram) < 1e14 else 0.0
     found = [k for k in (rigid, steps / energy) if np.isfinite(k) and k > 0.0]
     if not found:
@@ -84,7 +84,7 @@ def derive_space(records: Sequence[Record], controller: PI | None) -> SearchSpac
     return SearchSpace(
         gain=(min(found) / 30.0, max(found) * 1000.0),
         real=(-10.0 / longest, 1.0 / dt),
-        imaginary=(min(0.5 / longest, 0.1 / dt), 0.8 * math.pi / dt),  # no decision: a range to search
+        imaginary=(min(0.5 / longest, 0.1 / dt), 0.8 * math.pi / dt),  # no decision: a start: a range to search
         p=(0, 3) if controller is not None and controller.loop == "continuous" else (1, 3),
         source=f"derived from the data: K about {shown}, sample time {1e3 * dt:.4g} ms",
     )
@@ -108,8 +108,8 @@ def _gain_on_a_spring(records: Sequence[Record], controller: PI | None) -> list[
         for row in line:
             x -= np.array([_dot(one, row) for one in x])[:, None] * row
         products = np.array([[_dot(one, other) for other in x] for one in x])
-        gram += products[:3, :3]  # no decision: the place of a block
-        right += products[:3, 3]  # no decision: the place of a block
+        gram += products[:3, :3]  # no decision: a formula: the place of a block
+        right += products[:3, 3]  # no decision: a formula: the place of a block
     sizes = np.sqrt(np.maximum(np.diag(gram), 1e-300))
     K, _, c = np.linalg.lstsq(gram / np.outer(sizes, sizes), right / sizes, rcond=1e-12)[0] / sizes
     return [float(K)] if K > 0.0 and c > 0.0 else []

@@ -39,7 +39,7 @@ __all__ = [
 
 Vector = NDArray[np.float64]
 
-TWO_MASSES = 3  # no decision: poles of two masses
+TWO_MASSES = 3  # no decision: how many poles two masses have
 HALF = 0.5  # no decision: of a sample, the age of a mean over it
 
 

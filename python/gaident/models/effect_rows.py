@@ -90,7 +90,7 @@ class Row(NamedTuple):
     @property
     def sides(self) -> tuple[str, ...]:
         """The sides at which the effect may act; () where it has none."""
-        return () if self.place != SHAFT else ("motor",) if self.own else SIDES
+        return SIDES if self.place == SHAFT else ()
 
     @property
     def key(self) -> str:

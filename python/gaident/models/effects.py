@@ -100,10 +100,11 @@ def register(
     Exactly one of the five functions says what it does.
     Each takes (signals, one keyword per parameter), see `Signals`; arguments and answer are arrays, an entry per drive simulated
     side by side.
-    It is called at every (sub)step, may be asked about anything that a search tries, and keeps nothing from call to call.
-    No function of yours can be a dynamic actuator or sensor, a friction with a memory or a coupling of two masses: a search asks
-    about many models side by side, in any order and with repeated samples, so that a function has no state, and a coupling's law
-    needs its derivative within the implicit solution of the step.
+    The core asks in the order of time, once at every (sub)step, and gives a function no state that would belong to one drive and
+    begin anew with each run: it keeps nothing from call to call.
+    So no function of yours can be a dynamic actuator or sensor, or a friction with a memory; nor can it be a coupling of two
+    masses, whose twist is no signal and whose step is solved implicitly. docs/how-to/own-effects.md goes through all hooks.
+    A torque or a friction may act at the load of two masses, `with_effect(name, side="load", ...)`.
     A torque is stable where it changes with the velocity by less than the drive's inertia J over a substep h allows:
     abs(d torque/d velocity) < J/h.
 
@@ -122,9 +123,9 @@ def register(
         limit of its slope.
         Where the torque drives the model no controller is simulated, and it does nothing.
     torque : callable, optional
-        What is added to the motor's torque [N m]; a brake is negative for positive velocity.
+        What is added to the motor's torque [N m], or acts on the load; a brake is negative for positive velocity.
     friction : callable, optional
-        Level >= 0 of a dry friction [N m], which stops the motor and keeps it at standstill.
+        Level >= 0 of a dry friction [N m], which stops the motor, or the load, and keeps it at standstill.
         (A torque that jumps with the direction of the velocity would oscillate about standstill instead.)
     actuator : callable, optional
         The torque that acts [N m] in place of signals.torque, before saturation, dead band, delay and lag.
@@ -345,8 +346,7 @@ def _checked_side(row: Row, side: object) -> str:
     if side in row.sides:
         return str(side)
     if side == SIDES[1]:
-        what = "an effect of your own, a torque at the motor" if row.own else f"in the {row.place}"
-        raise ModelError(f"side of {row.name} is {side!r}: it is {what} and has no other side; leave side out")
+        raise ModelError(f"side of {row.name} is {side!r}: it is in the {row.place} and has no other side; leave side out")
     return SIDES[0] if row.sides else ""
 
 

@@ -32,7 +32,7 @@ class Transfer(NamedTuple):
 def _resonance(values: Sequence[float]) -> Transfer:
     """(wp/wz)^2 (s^2 + 2 zz wz s + wz^2)/(s^2 + 2 zp wp s + wp^2)."""
     wp, zp, wz, zz = values
-    poles, zeros = (tuple(quadratic_roots(2.0 * zeta * w, w * w)) for zeta, w in ((zp, wp), (zz, wz)))
+    poles, zeros = (tuple(quadratic_roots(2.0 * zeta * w, w * w)) for zeta, w in ((zp, wp), (zz, wz)))  # no decision: a formula
     return Transfer((wp / wz) ** 2, poles, zeros)
 
 

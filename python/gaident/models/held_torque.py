@@ -33,4 +33,4 @@ def held_torque(rec: Record) -> Signal:
     """
     assert rec.torque is not None
     u = np.ascontiguousarray(rec.torque, dtype=np.float64)
-    return np.append(0.5 * (u[1:] + u[:-1]), u[-1]) if sampled_between(rec) else u  # no decision: a mean of two
+    return np.append(0.5 * (u[1:] + u[:-1]), u[-1]) if sampled_between(rec) else u  # no decision: a formula: a mean of two

@@ -57,7 +57,8 @@ class OneMass:
     std: Mapping[str, float] = field(default_factory=dict, hash=False)
 
     def __post_init__(self) -> None:
-        _check(self, positive=("J",), not_negative=("D",))
+        for name, value in _checked(self, positive=("J",), not_negative=("D",)).items():
+            object.__setattr__(self, name, value)
 
     def model(self) -> Model:
         """Return the factored model: K = 1/J, A11 = D/J (equation 4)."""
@@ -138,13 +139,14 @@ class TwoMass:
     JL: float
     DL: float
     KG: float
-    DG: float = 0.0  # no decision: a shaft without damping, where none is given
+    DG: float = 0.0  # no decision: what an argument may be: a shaft without damping
     inconsistency: float | None = None
     std: Mapping[str, float] = field(default_factory=dict, hash=False)
     with_shaft_damping: TwoMass | None = None
 
     def __post_init__(self) -> None:
-        _check(self, positive=("JM", "JL", "KG"), not_negative=("DM", "DL", "DG"))
+        for name, value in _checked(self, positive=("JM", "JL", "KG"), not_negative=("DM", "DL", "DG")).items():
+            object.__setattr__(self, name, value)
 
     def model(self) -> Model:
         """Return the factored model (equation 5), p = 1 and q = 2; raise ModelError where a mass has no inertia."""
@@ -320,16 +322,18 @@ def _require(model: Model, p: int, q: int, name: str) -> None:
         )
 
 
-def _check(drive: Mechanics, positive: tuple[str, ...], not_negative: tuple[str, ...]) -> None:
+def _checked(drive: Mechanics, positive: tuple[str, ...], not_negative: tuple[str, ...]) -> dict[str, object]:
+    """The numbers of a drive as floats, and its deviations, by name."""
+    found: dict[str, object] = {"std": dict(drive.std)}
     for name in positive + not_negative:
         unit = drive.UNITS[name]
         value = real_number(getattr(drive, name), name, ModelError, f"give one finite number in {unit}")
-        object.__setattr__(drive, name, value)
+        found[name] = value
         # What an identification found is data, however odd: see `notes`.
         if drive.inconsistency is None and (value < 0.0 or (value == 0.0 and name in positive)):
             least = "> 0" if name in positive else ">= 0"
             raise ModelError(f"{name} is {value:g}: give a number {least} in {unit}")
-    object.__setattr__(drive, "std", dict(drive.std))
+    return found
 
 
 def _notes(drive: Mechanics, positive: tuple[str, ...], not_negative: tuple[str, ...], rounding: float) -> tuple[Text, ...]:

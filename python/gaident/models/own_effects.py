@@ -1,13 +1,13 @@
 """User-defined effects: a Python function of the loop's signals, with parameters and units, called by the core at its place.
 
     controller command    r' = command(s)                    the velocity command that is followed in place of the one given
-    shaft      torque     T + torque(s)                      added to the motor's torque
-               friction   abs(friction torque) <= level(s)   dry friction, which stops the motor and holds it
+    shaft      torque     T + torque(s)                      added to the torque at the motor, or at the load of two masses
+               friction   abs(friction torque) <= level(s)   dry friction, which stops the motor or the load and holds it
     actuator              u' = actuator(s)                   the torque that acts in place of the one commanded
     sensor                w' = sensor(s)                     the velocity that is seen in place of the true one
 
-Asked once per substep at the shaft (with the velocity in the middle of the substep, so that the answer is of second order), once
-per sample at command and actuator; `register` says what a function has to be like.
+Asked in the order of time: once per substep at the shaft (with the velocity in the middle of the substep, so that the answer is
+of second order), once per step of the controller at command and actuator; `register` says what a function has to be like.
 """
 
 from __future__ import annotations
@@ -41,11 +41,13 @@ class Signals(NamedTuple):
     Attributes
     ----------
     velocity : ndarray, shape (m,)
-        Velocity of the motor [rad/s]; at the shaft that in the middle of the substep.
+        Velocity of the motor [rad/s]; at the shaft that in the middle of the substep. Of an effect at the load the load's.
     angle : ndarray, shape (m,)
-        Angle of the motor [rad].
+        Angle of the motor [rad]; of an effect at the load the load's.
     torque : ndarray, shape (m,)
-        Torque [N m]. At the shaft: what saturation, dead band, delay and lag left of the command. At the actuator: the command.
+        Torque [N m].
+        At the shaft, at either end: what saturation, dead band, delay and lag left of the command, and what built-in effects at
+        the motor add. At the actuator: the command.
         At command and sensor: the torque that is held until then.
     time : float
         Time since the record's start [s].

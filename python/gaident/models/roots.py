@@ -110,7 +110,7 @@ def polynomial_roots(coefficients: Sequence[float] | NDArray[np.float64]) -> NDA
     scaled = np.concatenate([[1.0], c / scale ** np.arange(1, n + 1)])
     slope = np.polyder(scaled)
     roots = np.roots(scaled).astype(np.complex128)
-    if n == 3:  # no decision: a degree
+    if n == 3:  # no decision: a formula: a degree
         real = roots[np.abs(roots.imag) == np.min(np.abs(roots.imag))].real
         best = real[np.argmax(np.abs(np.polyval(slope, real)))]
         roots = np.array([best], dtype=np.complex128)
@@ -129,7 +129,7 @@ def polynomial_roots(coefficients: Sequence[float] | NDArray[np.float64]) -> NDA
         found.append(complex(root))
         if root.imag != 0.0:
             found.append(complex(root).conjugate())
-    if n == 3:  # no decision: a degree
+    if n == 3:  # no decision: a formula: a degree
         r = found[0].real
         # s^3 + c0 s^2 + c1 s + c2 = (s - r)(s^2 + q1 s + q0), each of q1, q0 by the equation that does not cancel
         _, c0, c1, c2 = (float(v) for v in scaled)

@@ -107,9 +107,9 @@ class SearchSpace:
         resonance_hz: Range,
         damping: Range | None = None,
         *,
-        p: tuple[int, int] = (0, 3),  # no decision: a range to search
-        q: tuple[int, int] = (0, 3),  # no decision: a range to search
-        bits: int = 10,  # no decision: the resolution of a search
+        p: tuple[int, int] = (0, 3),  # no decision: a start: a range to search
+        q: tuple[int, int] = (0, 3),  # no decision: a start: a range to search
+        bits: int = 10,  # no decision: a grid: the resolution of a search
     ) -> SearchSpace:
         """Return the ranges of an axis as an engineer knows it.
 
@@ -141,7 +141,7 @@ class SearchSpace:
         resonance_hz = _pair("resonance_hz", resonance_hz, above_zero=True)
         damping = None if damping is None else _pair("damping", damping, above_zero=False)
         top = 2.0 * math.pi * resonance_hz[1]
-        real = top if damping is None else max(damping[1] / inertia[0], 0.3 * top)  # no decision: a range to search
+        real = top if damping is None else max(damping[1] / inertia[0], 0.3 * top)  # no decision: a start: a range to search
         return cls(
             gain=(1.0 / inertia[1], 10.0 / inertia[0]),
             real=(0.0, real),
@@ -158,7 +158,7 @@ class SearchSpace:
 
         scale = self.gain_scale
         if scale is None:
-            # no decision: the scale of a search
+            # no decision: a start: the scale of a search
             scale = 1.0 if paper else 0.1 * math.sqrt(max(self.real[1], 1e-9) * self.imaginary[1])
         return _core.SearchRanges(
             gain=self.gain, real=self.real, imaginary=self.imaginary, p=self.p, q=self.q, bits=self.bits, gain_scale=scale

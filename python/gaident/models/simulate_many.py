@@ -14,6 +14,7 @@ from gaident.control.controller import Controller
 from gaident.data.record import Record
 from gaident.errors import GaidentError, ModelError
 from gaident.models.discrete import require_strictly_proper
+from gaident.models.effect_rows import effect_and_side, key_of
 from gaident.models.effects import parameter_count
 from gaident.models.factors import FactorCounts
 from gaident.models.model import Model
@@ -164,7 +165,7 @@ class LoadedRecord:
         table = np.ascontiguousarray(values, dtype=np.float64)
         starts = np.zeros((0, 0)) if initial_states is None else np.ascontiguousarray(initial_states, dtype=np.float64)
         built_in, own = _parted(structure, effects, table)
-        names = [e for e in effects if e not in OWN]
+        names = [e for e in effects if not _is_own(e)]
         asked = tuple(structure), names, starts, checked_substeps(substeps), workers, own
         try:
             if not own:
@@ -181,16 +182,16 @@ def simulated_with_effects(
     record: _core.EffectRecord, plants: Sequence[Model], starts: Signal, steps: int, workers: int, every: bool
 ) -> tuple[Signal, Signal, Signal]:
     """The core's simulation of models, those with the same user-defined effects at once."""
-    acting = [tuple(e.name for e in plant.own_effects()) for plant in plants]
+    acting = [tuple(e.key for e in plant.own_effects()) for plant in plants]
     if not any(acting):
         return record.simulate([plant.core() for plant in plants], starts, steps, workers, every)
     found: list[Signal] | None = None
-    for names in dict.fromkeys(acting):
-        index = [i for i, mine in enumerate(acting) if mine == names]
+    for keys in dict.fromkeys(acting):
+        index = [i for i, mine in enumerate(acting) if mine == keys]
         own: OwnList = []
-        for name in names:
-            rows = [next(e.values for e in plants[i].effects if e.name == name) for i in index]
-            own.append((OWN[name].acts, OWN[name].ask, np.array(rows, dtype=np.float64)))
+        for key in keys:
+            rows = [next(e.values for e in plants[i].effects if e.key == key) for i in index]
+            own.append(_asked(key, np.array(rows, dtype=np.float64)))
         some = starts[index] if starts.size else starts
         with np.errstate(all="ignore"):
             parts = record.simulate([plants[i].core() for i in index], some, steps, workers, every, own=own)
@@ -203,17 +204,27 @@ def simulated_with_effects(
     return found[0], found[1], found[2]
 
 
+def _is_own(key: str) -> bool:
+    return effect_and_side(key)[0] in OWN
+
+
+def _asked(key: str, values: Signal) -> tuple[str, Callable[..., Any], Signal]:
+    """A user-defined effect as the core takes it: where it acts, what it asks, a row of values for each model."""
+    name, side = effect_and_side(key)
+    return key_of(OWN[name].acts, side), OWN[name].ask, values
+
+
 def _parted(structure: FactorCounts, effects: Sequence[str], values: Signal) -> tuple[Signal, OwnList]:
     """Rows of values of `simulate_values` without the columns of user-defined effects, and these."""
-    if not any(e in OWN for e in effects):
+    if not any(map(_is_own, effects)):
         return values, []
     at = 1 + structure.real_poles + 2 * structure.pole_pairs + structure.real_zeros + 2 * structure.zero_pairs
     kept, own = [values[:, :at]], []
     for e in effects:
         columns = values[:, at : at + parameter_count(e)]
         at += parameter_count(e)
-        if e in OWN:
-            own.append((OWN[e].acts, OWN[e].ask, np.ascontiguousarray(columns)))
+        if _is_own(e):
+            own.append(_asked(e, np.ascontiguousarray(columns)))
         else:
             kept.append(columns)
     if values.shape[1] != at:

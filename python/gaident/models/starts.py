@@ -25,7 +25,7 @@ def noise_std(velocity: NDArray[np.float64], step: float = 0.0) -> float:
     """
     thirds = np.concatenate([np.diff(w, 3)[_outside_runs(w)] for w in stretches(velocity)])
     least = step / np.sqrt(12.0)
-    # no decision: of white noise, third differences and the median
+    # no decision: a formula: third differences of white noise and their median
     return float(max(1.4826 * np.median(np.abs(thirds)) / np.sqrt(20.0), least)) if len(thirds) else float(least)
 
 
@@ -40,7 +40,7 @@ def _outside_runs(x: NDArray[np.float64]) -> NDArray[np.bool_]:
     return clear
 
 
-# no decision: samples that a spread is taken from
+# no decision: how many samples a spread is taken from
 def stretches(x: NDArray[np.float64], count: int = 64, length: int = 16384) -> list[NDArray[np.float64]]:
     """Evenly spaced parts of a long signal; of a shorter one the whole."""
     if len(x) <= count * length:

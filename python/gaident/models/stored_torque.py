@@ -59,7 +59,7 @@ def _first_level(off: Vector) -> float:
     far = max(len(off) // PARTS, 2)
     near, wide = (float(np.mean((off[m:] - off[:-m]) ** 2)) for m in (1, far))
     walk = max((wide - near) / (far - 1), 0.0)
-    white = max((near - walk) / 2.0, 0.0)  # no decision: a difference of two
+    white = max((near - walk) / 2.0, 0.0)  # no decision: a formula: a difference of two
     if walk == 0.0:
         return float(np.mean(off))
     ratio = walk / white if white > 0.0 else np.inf

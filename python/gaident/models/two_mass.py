@@ -112,10 +112,10 @@ def mechanics_with_shaft_damping(c: Vector) -> Vector | None:
     m = sum_a - load
     d0, d1 = 0.5 * (m - prod_a / b0), 0.5 * load  # d = d0 + d1 R
     a, b, e = b0 - d1 * d1, -(pair_a - b0 - m * load + 2.0 * d0 * d1), -d0 * d0
-    discriminant = b * b - 4.0 * a * e  # no decision: roots of a quadratic
+    discriminant = b * b - 4.0 * a * e  # no decision: a formula: the roots of a quadratic
     if discriminant < 0.0:
         return None
-    half = -0.5 * (b + np.copysign(np.sqrt(discriminant), b))  # no decision: roots of a quadratic
+    half = -0.5 * (b + np.copysign(np.sqrt(discriminant), b))  # no decision: a formula: the roots of a quadratic
     roots = [half / a] if a != 0.0 else []
     roots += [e / half] if half != 0.0 else []
     if not roots:

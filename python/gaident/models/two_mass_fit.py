@@ -124,7 +124,7 @@ def whitening_of(cov: Matrix, scales: Vector) -> Matrix:
 def jacobian(function: Callable[[Vector], Vector], x: Vector, scale: Vector) -> Matrix:
     """d function / d x by central differences of 1e-6 scale."""
     columns = []
-    for i, step in enumerate(1e-6 * scale):
+    for i, step in enumerate(1e-6 * scale):  # no decision: the step of a difference
         up, down = x.copy(), x.copy()
         up[i] += step
         down[i] -= step

@@ -19,7 +19,9 @@ __all__ = [
     "LAGS",
     "LOOP",
     "NOISE",
+    "NUMBERS",
     "PERIODS",
+    "PITCHES",
     "PROFILES",
     "PROPOSALS",
     "REAL",
@@ -73,10 +75,12 @@ PROPOSALS = "proposals"
 UNLOGGED = "unlogged"
 RESPONSES = "responses"
 HEADERS = "headers"
+PITCHES = "pitches"
+NUMBERS = "numbers"
 SHOWN_BY = (
     *(DRIVES, SHORT, LOOP, SLOWER, SHIFTED, REAL, REGRESSION, SUCCESS, WINDING, FORMS, LOGS),
     *(ENCODER, PERIODS, PROFILES, AHEAD, SAMPLED, SHORT_MOVES, LAGS),
-    *(PROPOSALS, UNLOGGED, RESPONSES, HEADERS),
+    *(PROPOSALS, UNLOGGED, RESPONSES, HEADERS, PITCHES, NUMBERS),
 )
 
 GAIN = "Is the gain enough?"

@@ -51,6 +51,7 @@ class Effort:
     regressions: int = effort(50, "regressions", "of a discrete model, each filtered by the noise model of the one before")
     evolution: int = effort(50, "generations", "of a global search beside stops and impacts")
     deepenings: int = effort(12, "searches", "of that kind near the model that was selected, until they gain no more")
+    draws_in_vain: int = effort(2, "searches", "of these that gain nothing, one after the other, before they end")
     population: int = effort(6, "1", "members of that search for each number that it moves")
 
     # Starts and points of a grid.

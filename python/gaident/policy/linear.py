@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from gaident.policy.declared import DRIVES, REGRESSION, SHIFTED, SUCCESS, WINDING, linear
+from gaident.policy.declared import DRIVES, PITCHES, REGRESSION, SHIFTED, SUCCESS, WINDING, linear
 
 __all__ = ["LinearModels"]
 
@@ -18,6 +18,28 @@ class LinearModels:
 
     test_level: float = linear(
         1e-4, "probability", "of the tests that a linear model holds, that a replay leaves white noise", SUCCESS
+    )
+    input_lag: int = linear(
+        32,
+        "samples",
+        "highest lag of the input that a residual is tested on: 0, 1, and from there on each twice the last",
+        SUCCESS,
+    )
+    samples_per_input_lag: int = linear(
+        4, "samples", "of the shortest record, for each sample of such a lag: a longer lag has too few of them", SUCCESS
+    )
+    white_lags: int = linear(
+        20,
+        "samples",
+        "lags at most of a test that a residual is white; its power is spread over them (Ljung and Box 1978)",
+        SUCCESS,
+    )
+    samples_per_white_lag: int = linear(5, "samples", "of all records, for each of these lags", SUCCESS)
+    no_direction: float = linear(
+        0.01,
+        "1",
+        "of the largest simulated velocity: below, its sign is 0 where a residual is tested on it, as rounding would give it one",
+        SUCCESS,
     )
     undecided_ratio: float = linear(
         2.0, "1", "rms of a residual over the noise: above, what is not white may hide a misfit", SUCCESS
@@ -45,6 +67,9 @@ class LinearModels:
     )
     standing_share: float = linear(0.005, "1", "of the velocity's rms, below which it stands still there", REGRESSION)
     both_ways: float = linear(0.02, "1", "of the rows in either direction at least, to tell dry friction from a load", REGRESSION)
+    round_deviations: float = linear(
+        2.0, "1", "standard deviations of a pitch: of the lengths within them the one with the fewest digits is taken", PITCHES
+    )
     spring_turns: float = linear(10.0, "turns", "of travel: beyond, no spring is fixed to the ground", REGRESSION)
     another_mass: float = linear(
         2.0,

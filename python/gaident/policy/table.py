@@ -5,14 +5,15 @@ A decision is never made by a number that stands elsewhere: `tests/python/projec
 Numbers that follow from records without effects are calibrated: `python bench/blind.py --calibrate` writes them into
 `calibrated.json`, which is read here. The others are set by hand, for the reason that their row gives.
 
-Three groups stand in modules of their own: what a record shows (`records.py`), which linear model holds and in which band a
-regression looks (`linear.py`), what a proposed experiment may ask of the axis (`experiments.py`).
+Five groups stand in modules of their own: how a log is read (`readings.py`), what a record shows (`records.py`), which linear
+model holds and in which band a regression looks (`linear.py`), which controllers are looked for (`controllers.py`), what a
+proposed experiment may ask of the axis (`experiments.py`).
 
 Effort is the last group (`effort.py`): what bounds the work of a search or a fit, such as iterations, starts, points of a grid,
 samples that are looked at. More of it may find more, and changes no decision about what was found.
 
 Other modules keep numbers that decide nothing and bound no search, each with a name in capitals or a comment
-`# no decision: why`. One that is compared or bounds looks like a number that decides, and says why in these words or a sentence:
+`# no decision: why`. Each looks like a number that decides to somebody, and says why it does not in these words or a sentence:
 
 - "a start": a value from which one fit begins, or the ends of a grid of them; how many there are is effort.
   The bounds and starts of an effect's parameters stand in its row of the library.
@@ -20,7 +21,7 @@ Other modules keep numbers that decide nothing and bound no search, each with a 
   A solver ends by its tolerance, and more steps of it change nothing.
 - "memory": the size of a block in which something is read or computed. Any other size gives the same result.
 - "a grid", orders and lags: the models, or frequencies of a test, among which a criterion chooses.
-- Formulas, units, formats of files, what an argument may be, how something is printed or drawn.
+- "a formula", "a unit", "a format" of files, "what an argument may be", "how many" there are, what is "printed" or "drawn".
 """
 
 from __future__ import annotations
@@ -29,19 +30,18 @@ import math
 from dataclasses import dataclass, fields
 from typing import NamedTuple
 
+from gaident.policy.controllers import ControllerRanges
 from gaident.policy.declared import (
     AHEAD,
     DRIVES,
     FORMS,
     GAIN,
-    HEADERS,
     LAGS,
     NOISE,
     PERIODS,
     PROFILES,
     REAL,
     RESPONSES,
-    SAMPLED,
     SHIFTED,
     SHORT,
     SHORT_MOVES,
@@ -53,11 +53,11 @@ from gaident.policy.declared import (
     gain,
     loop,
     noise,
-    reading,
 )
 from gaident.policy.effort import Effort
 from gaident.policy.experiments import Experiments
 from gaident.policy.linear import LinearModels
+from gaident.policy.readings import Readings
 from gaident.policy.records import Records
 
 __all__ = ["POLICY", "Decisions", "Policy", "PolicyRow", "rows"]
@@ -67,7 +67,7 @@ __all__ = ["POLICY", "Decisions", "Policy", "PolicyRow", "rows"]
 class Decisions:
     """The numbers that decide, in the order of the questions that they answer.
 
-    The last questions have modules of their own: `records.py`, `linear.py`, `experiments.py`.
+    Others have modules of their own: `controllers.py`, `records.py`, `linear.py`, `experiments.py`.
     """
 
     # Is the gain enough? One criterion: BIC and a penalty for each effect, which stands for the number of candidates tried.
@@ -325,51 +325,9 @@ class Decisions:
     notch_most_damping: float = loop(2.0, "1", "the same at most: beyond, a notch is two low passes far apart", UNLOGGED)
     negligible: float = loop(1e-3, "1", "of a signal's largest value or range: less is 0, or the rounding of a log")
 
-    # How is a log read? What a file does not say is refused or asked; these say where it is clear.
-    clock_jitter: float = reading(0.01, "1", "of a sample time, by which a step, or the given dt, may differ")
-    coarse_stamps: float = reading(0.25, "1", "of a sample time: stamps printed more coarsely hide a lost sample")
-    few_unequal: float = reading(0.1, "1", "of the steps: so few unequal ones are real; more come from printed stamps")
-    even_rise: float = reading(0.02, "1", "of a step, by which the steps of a column differ that is a time")
-    pause: float = reading(5.0, "1", "of the usual step: a longer one is a pause, through which no line is drawn")
-    resample_coarser: float = reading(1.5, "1", "of a log's step: a coarser grid would alias what is fast")
-    resample_finer: float = reading(100.0, "1", "of a log's step over the given one: finer, the given step is in another unit")
-    unit_shown: float = reading(0.02, "1", "relative difference up to which a slope shows a unit, a jump an integer's range")
-    derivative: float = reading(0.98, "1", "correlation of a column with the slope of another, from which it is its derivative")
-    wrap_jump: float = reading(0.75, "1", "of a position's range: a jump as long may be a counter that wraps")
-    wrap_beside: float = reading(0.25, "1", "of that jump: the steps beside it are shorter")
-    wrap_alike: float = reading(0.05, "1", "of that jump, by which the steps before and behind it differ at most")
-    wrap_steady: float = reading(0.5, "1", "least ratio of the steps before and after a wrap, the shorter one to the longer one")
-    wrap_reach: int = reading(8, "samples", "on either side of a jump, in which a slow motion shows its direction")
-    wrap_spared: float = reading(0.999, "1", "of the steps are no jumps then; the rest may be lost samples")
-    overlap: float = reading(0.3, "1", "of the shorter of two logs, that both have at least")
-    aligned: float = reading(0.5, "1", "correlation of two logs of one motion at least")
-    longest_hold: float = reading(
-        4e-3, "s", "sample time of a controller at most: a torque measured less often is no held one", SAMPLED
-    )
-    rate_seen: float = reading(3.0, "1", "standard deviations from 0, from which two clocks run at different rates")
-
-    words_needed: int = reading(
-        2, "points", "that have to speak for a column by its name and unit, to take it for a channel", HEADERS
-    )
-    name_points: int = reading(4, "points", "of a word that names the channel's quantity (velocity, torque, position)", HEADERS)
-    related_points: int = reading(
-        3, "points", "of a word for what comes with it (a current with a torque, an encoder with a position)", HEADERS
-    )
-    unit_points: int = reading(3, "points", "of a unit that is one of the channel's quantity", HEADERS)
-    command_points: int = reading(3, "points", "of a word for a command, as much as of a unit: a command is called so", HEADERS)
-    letter_points: int = reading(
-        2, "points", "of a letter or two (n, M, i, qm); behind a path's other words it says nothing", HEADERS
-    )
-    least_letters: int = reading(
-        3, "letters", "of a known word that is looked for inside a longer one: shorter ones are in any", HEADERS
-    )
-    whole_rows: float = reading(0.9, "1", "of the lines made of digits: so many may have commas of both meanings", HEADERS)
-    odd_rows: float = reading(0.1, "1", "of these, of another width: so many, and the user is asked what the commas are", HEADERS)
-    wide_letters: float = reading(0.8, "1", "of every second byte that is 0: a text of 16 bits a letter (UTF-16)", HEADERS)
-
 
 @dataclass(frozen=True)
-class Policy(Effort, Experiments, LinearModels, Records, Decisions):
+class Policy(Effort, Experiments, LinearModels, Records, Readings, ControllerRanges, Decisions):
     """The whole table: first what decides, then effort. `rows()` lists all with unit, source and command."""
 
 

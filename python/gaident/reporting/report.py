@@ -183,5 +183,5 @@ def _made_with() -> dict[str, str]:
     from importlib.metadata import version as installed
 
     names = ("numpy", "scipy", "matplotlib", "plotly")
-    python = ".".join(map(str, sys.version_info[:3]))  # no decision: a version
+    python = ".".join(map(str, sys.version_info[:3]))  # no decision: printed: a version
     return {"gaident": version(), "Python": python, **{n: installed(n) for n in names}}

@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 __all__ = ["Diagnosis"]
 
 SCHEMA = "gaident/diagnosis"
-SCHEMA_VERSION = 1  # no decision: the version of a format
+SCHEMA_VERSION = 1  # no decision: a format: its version
 
 
 @dataclass(frozen=True, repr=False)

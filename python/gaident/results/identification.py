@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 __all__ = ["Identification"]
 
 SCHEMA = "gaident/identification"
-SCHEMA_VERSION = 1  # no decision: the version of a format
+SCHEMA_VERSION = 1  # no decision: a format: its version
 
 
 @dataclass(frozen=True, repr=False)

@@ -251,7 +251,7 @@ def fall_words(dia: Diagnosis) -> str:
         return Text(f"In free run the extended model diverges, {linear}.")
     if diverges(dia.before):
         return Text("In free run the linear model diverges, the extended one does not.")
-    fall = 100.0 * (1.0 - dia.after.rmse / dia.before.rmse)  # no decision: percent
+    fall = 100.0 * (1.0 - dia.after.rmse / dia.before.rmse)  # no decision: a unit: percent
     low, high = (100.0 * x for x in dia.gain_interval)
     if fall < -1.0:
         return _growth_words(dia, -fall)
@@ -348,7 +348,7 @@ def moved_words(old: float, new: float, std: float | None) -> str:
         return ""
     if old * new <= 0.0:
         return "other sign"
-    if new / old >= 10.0:  # no decision: how a number is printed
+    if new / old >= 10.0:  # no decision: printed: a number
         return f"{number(new / old, 3)} times as large"
     return f"{round(100.0 * (new / old - 1.0), 1) + 0.0:+.1f} %"
 
@@ -394,7 +394,7 @@ def next_words(dia: Diagnosis, p: Proposal) -> Text:
 
 
 def _how(dia: Diagnosis) -> list[str]:
-    data = ", ".join(digest[:12] for digest in dia.digests)  # no decision: how much of a digest is printed
+    data = ", ".join(digest[:12] for digest in dia.digests)  # no decision: printed: of a digest
     version = dia.version or "of unknown version"
     work = f"{dia.samples} samples, {dia.simulations} simulations, {dia.seconds:.2f} s"
     return _wrapped(f"{work}; seed {dia.seed}, gaident {version}, data {data}")

@@ -59,7 +59,7 @@ def typeset(text: str) -> Html:
     return Html(done)
 
 
-def number(value: float, digits: int = 4) -> Html:  # no decision: how a number is printed
+def number(value: float, digits: int = 4) -> Html:  # no decision: printed: a number
     """A number of so many digits, fixed where that is short, else m x 10^e."""
     if not math.isfinite(value):
         return Html("&ndash;" if math.isnan(value) else "&infin;")
@@ -67,7 +67,7 @@ def number(value: float, digits: int = 4) -> Html:  # no decision: how a number 
         return Html("0")
     mantissa, exponent = f"{value:.{digits - 1}e}".split("e")
     power = int(exponent)
-    # no decision: how a number is printed
+    # no decision: printed: a number
     text = f"{value:.{max(digits - 1 - power, 0)}f}" if -3 < power < 6 else f"{mantissa}&times;10<sup>{power}</sup>"
     return Html(text.replace("-", "&minus;"))
 

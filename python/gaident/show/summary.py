@@ -190,7 +190,7 @@ def inconsistency_words(m: Mechanics) -> str:
     if m.inconsistency is None:
         return ""
     std = m.std.get("inconsistency", math.nan)
-    text = f"inconsistency without shaft damping {with_std(100.0 * m.inconsistency, 100.0 * std)} %"  # no decision: percent
+    text = f"inconsistency without shaft damping {with_std(100.0 * m.inconsistency, 100.0 * std)} %"  # no decision: printed
     if not std > 0.0:
         return text
     if m.inconsistency <= POLICY.contradiction * std:

@@ -18,7 +18,7 @@ __all__ = [
     "words",
 ]
 
-WIDTH = 100  # no decision: letters of a line
+WIDTH = 100  # no decision: printed: letters of a line
 GAINS = {"kp", "ki"}
 SPREAD = "is the spread that noise alone makes; what the model gets wrong may move a value further."
 """Of a standard deviation; stands behind its sign."""
@@ -41,14 +41,14 @@ def structure_words(p: int, q: int) -> str:
     return known.get((p, q), "neither one mass nor two")
 
 
-def number(value: float, digits: int = 4) -> str:  # no decision: how a number is printed
+def number(value: float, digits: int = 4) -> str:  # no decision: printed: a number
     """`value` with so many significant digits; a dash where there is none."""
     return f"{value + 0.0:.{digits}g}" if math.isfinite(value) else "-" if math.isnan(value) else f"{value}"
 
 
 def diverges(run: Fitness) -> bool:
     """Whether the error of a free run is `diverged` times the motion: no figure of a model."""
-    return run.fit_percent < 100.0 * (1.0 - POLICY.diverged)  # no decision: in percent
+    return run.fit_percent < 100.0 * (1.0 - POLICY.diverged)  # no decision: a unit: percent
 
 
 def free_run_words(run: Fitness, written: Callable[[float], str] = number) -> tuple[str, str]:
@@ -60,9 +60,9 @@ def free_run_words(run: Fitness, written: Callable[[float], str] = number) -> tu
 
 def step_words(gain: float) -> str:
     """By how much an effect lets the error of the free run fall, of what was left before it: "83 %"."""
-    if not gain > -1e6:  # no number where one run diverges after another  # no decision: how a number is printed
+    if not gain > -1e6:  # no number where one run diverges after another  # no decision: printed: a number
         return "nothing (the free run diverges)"
-    if gain < -1e3:  # no decision: how a number is printed
+    if gain < -1e3:  # no decision: printed: a number
         return "nothing (the free run is worse by far)"
     share = round(100.0 * gain)
     return f"{share} %" if share >= 0 else f"nothing (the free run is worse: its error grows by {-share} %)"
@@ -76,11 +76,11 @@ def with_std(value: float, std: float | None) -> str:
         return f"{number(value, 5)} +- inf"
     size = math.floor(math.log10(max(abs(value), std)))
     decimals = 1 - math.floor(math.log10(std))
-    if -3 <= size < 6:  # no decision: how a number is printed
+    if -3 <= size < 6:  # no decision: printed: a number
         shift, digits = 0, max(decimals, 0)
     else:
         shift, digits = size, decimals + size
-    if digits > 9:  # next to no noise: the deviation needs an exponent of its own  # no decision: how a number is printed
+    if digits > 9:  # next to no noise: the deviation needs an exponent of its own  # no decision: printed: a number
         return f"{value:.9g} +- {std:.1e}"
     scale = 10.0**-shift
     text = f"{round(value * scale, digits) + 0.0:.{digits}f} +- {std * scale:.{digits}f}"

@@ -1,4 +1,4 @@
-"""A command between the lines of a log that is slower than the controller: straight, as a profile goes, round the bends of ramps."""
+"""A command between the lines of a log that is slower than its controller: straight, as a profile, round the bends of ramps."""
 
 from __future__ import annotations
 
@@ -169,10 +169,10 @@ def test_steps_are_held_and_bent_curves_go_straight_between_the_lines() -> None:
 
 
 def test_a_ramp_whose_bends_lie_between_the_lines_is_no_cause() -> None:
-    """A clean axis of two masses behind a current loop, 1 kHz of 4 kHz: a straight line through the bends named a delay, J 7 % off."""
+    """Two masses behind a current loop, 1 kHz of 4 kHz: a straight line through the bends named a delay, J 7 % off."""
     skip_without_library()
     loop = ga.Cascade(ga.PI(1.3, 80.0, rule="backward"), T)
-    axis = Plant(J=2.2e-3, D=1e-3, JL=3.4e-3, DL=1e-3, KG=900.0, DG=0.02, kp=1.3, ki=80.0, dt=EVERY * T, cascade=loop, name="axis")
+    axis = Plant(J=2.2e-3, D=1e-3, JL=3.4e-3, DL=1e-3, KG=900.0, DG=0.02, kp=1.3, ki=80.0, dt=EVERY * T, cascade=loop)
     whole = np.ascontiguousarray(ramps(2.0, T))
     lag = {"torque_lag": {"time_constant": 0.25e-3}}
     log = run_drive(axis, whole, lag, encoder=2 * np.pi / 2**20, differenced=True)

@@ -42,6 +42,7 @@ N, DT, NOISE = 800, 1e-3, 0.05
 SCALES = Scales(DT, N * DT, 1.0, 1.0, 1.0, 1.0, 0.02, float("nan"), float("nan"), False, 1.0)
 S = np.linspace(0.0, 1.0, N)  # time as a share of the record
 ONE = ga.OneMass(J=0.01, D=0.01).model()
+SPRUNG = ga.Model(100.0, [-2.0 + 30.0j, -2.0 - 30.0j], [0.0])
 TWO = ga.TwoMass(JM=0.01, DM=0.01, JL=0.02, DL=0.02, KG=50.0, DG=0.01).model()
 BASE = [np.sin((2.0 + 1.7 * i) * np.pi * S + 0.4 * i) for i in range(6)]  # what each base parameter adds
 DRIFT = 0.6 * np.sin(9.3 * np.pi * S) * S  # what nobody commanded, which only a closed loop follows
@@ -496,6 +497,42 @@ def test_what_was_grown_already_is_known() -> None:
 # Moves that reduce.
 
 
+HANGING = toy("hanging", [(0.3, 0.5)], nested=("placed",), shared={"placed": (1,)}, beside=frozenset({"a"}))
+
+
+def test_without_what_an_effect_stands_on_it_becomes_what_it_contains(monkeypatch: pytest.MonkeyPatch) -> None:
+    """At its level there: the pulse stands at 0.52, and a fit from another place does not feel it."""
+    monkeypatch.setitem(SHAPES, "hanging", lambda z: z[0] * wave(13.7) + pulse(z[1]))
+    bench = Bench({"placed": (0.52,), "a": (0.4,), "b": (0.4,)})
+    fit = bench.fit(A, B, HANGING)
+    assert fit.x[fit.parameters.slot("hanging")][1] == pytest.approx(0.52, abs=0.01)
+    less = bench.space.without(fit, "a")
+    assert less.effects == ("b", "placed")
+    assert less.x[less.parameters.slot("placed")] == pytest.approx([0.52], abs=0.01)
+    assert bench.space.without(fit, "b").effects == ("a", "hanging"), "what it stands on is still there"
+    assert bench.space.without(fit, "hanging").effects == ("a", "b")
+    assert names(bench.space.drop(fit)) == [("b", "placed"), ("a", "hanging"), ("a", "b")]
+
+
+def test_without_an_effect_beside_impacts_their_place_is_searched_again(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(model_space, "ObserverLoop", HalfFollowed)
+    hit = replace(VALLEY, place="coupling")
+    bench = Bench({"valley": (0.52,)}, masses=2, extra=DRIFT, loop=True)
+    stuck = bench.fit(hit, A)
+    assert abs(stuck.x[stuck.parameters.slot("valley")][0] - 0.52) > 0.1
+    less = bench.space.without(stuck, "a")
+    assert less.effects == ("valley",) and less.predictor.closed and less.x[-1] == pytest.approx(0.52, abs=2e-3)
+    assert abs(bench.space.without(bench.fit(VALLEY, A), "a").x[-1] - 0.52) > 0.1, "no impacts"
+    open_loop = Bench({"valley": (0.52,)}, masses=2)
+    assert abs(open_loop.space.without(open_loop.fit(hit, A), "a").x[-1] - 0.52) > 0.1, "no loop in which they are searched"
+    monkeypatch.setattr(moves.Moves, "evolved", lambda space, fit: replace(fit, bic=fit.bic + 1.0, x=fit.x + 0.3))
+    worse = bench.space.without(stuck, "a")
+    assert abs(worse.x[-1] - stuck.x[stuck.parameters.slot("valley")][0]) < 0.1, "a search that finds worse changes nothing"
+    monkeypatch.setattr(moves.Moves, "quiet", lambda space, fit: True)
+    monkeypatch.setattr(moves.Moves, "evolved", lambda space, fit: replace(fit, bic=-1e9))
+    assert bench.space.without(stuck, "a").bic > -1e9, "nothing but noise is left"
+
+
 def test_drop_leaves_out_each_effect_and_the_needless_one_goes() -> None:
     bench = Bench({"a": (0.4,)})
     both = bench.fit(A, B)
@@ -527,6 +564,23 @@ def test_demote_makes_one_mass_where_the_second_explains_nothing() -> None:
         assert bench.space.prefers(one, two) is back
 
 
+def test_demote_takes_the_spring_away_where_it_explains_nothing() -> None:
+    """One mass on a spring spans the first three base signals: the third is there, or it is not."""
+    for size, back in ((0.0, True), (0.4, False)):
+        bench = Bench({"a": (0.4,)}, extra=size * BASE[2])
+        parameters = Parameterisation.of(SPRUNG, SCALES, [False]).extended(A)
+        hypothesis = Hypothesis(parameters, Toy(bench.data))
+        sprung = bench.space.refitted(hypothesis, bench.start(hypothesis))
+        (free,) = bench.space.demote(sprung)
+        assert free.parameters.kind == "one mass" and free.effects == ("a",)
+        assert bench.space.prefers(free, sprung) is back
+        # It begins at the gain, the damping and the effects that the fit on the spring has.
+        start, x = mechanisms.released(sprung)
+        base = sprung.parameters.base_values(sprung.x[None, :])[0]
+        assert start.parameters.base_values(x[None, :])[0] == pytest.approx(base[:2])
+        assert x[start.parameters.slot("a")] == pytest.approx(sprung.x[parameters.slot("a")])
+
+
 def test_demote_keeps_what_needs_two_masses() -> None:
     bench = Bench({"a": (0.4,)}, masses=2)
     assert bench.space.demote(bench.fit()) == [], "the linear model was chosen by the bases"
@@ -548,6 +602,21 @@ def test_ground_puts_one_mass_on_a_spring_where_the_error_follows_the_angle(monk
     assert left[0] < 1.05 * NOISE and left[1] > 3.0 * NOISE
     assert bench.space.score(sprung) < bench.space.score(free)
     assert Bench({"a": (1.0,)}).space.ground(Bench({"a": (1.0,)}).fit(A)) == []
+
+
+def test_ground_begins_at_the_balance_too_where_nothing_but_a_spring_may_be_missing(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(moves, "balanced_on_a_spring", lambda data: SPRUNG)
+    bench = Bench({"a": (0.6,)}, extra=0.7 * BASE[2], plain=True)
+    free = bench.fit()
+    (sprung,) = bench.space.ground(free)
+    assert sprung.parameters.on_a_spring and bench.space.score(sprung) < bench.space.score(free)
+    assert bench.space.ground(bench.fit(A)) == [], "beside effects the linear test alone says how stiff it is"
+    still = Bench(plain=True)
+    assert still.space.ground(still.fit()) == [], "nothing is left to explain"
+    driven = Bench({"a": (0.6,)}, extra=-0.7 * BASE[2], plain=True)
+    assert driven.space.ground(driven.fit()) == [], "a negative stiffness is no spring"
+    monkeypatch.setattr(moves, "balanced_on_a_spring", lambda data: None)
+    assert bench.space.ground(free) == [], "the balance shows none"
 
 
 def test_close_shows_friction_in_its_loop_where_the_open_one_drifts_away() -> None:
@@ -724,19 +793,33 @@ def test_deepened_searches_near_impacts_until_nothing_more_is_gained(monkeypatch
     assert found.x[-1] == pytest.approx(0.52, abs=2e-3) and bench.space.score(found) < bench.space.score(stuck)
     without = bench.fit(VALLEY)
     assert bench.space.deepened(without) is without, "no impacts"
-    # Each search gains twice the margin, until there is no more of it; a search that finds worse changes nothing.
+    # It ends after two draws in a row that gain less than the margin; a search that finds worse changes nothing.
     margin, asked = bench.space.margin, []
-    gains = iter([2.0 * margin, 2.0 * margin, 0.5 * margin])
+    gains = iter([2.0 * margin, 2.0 * margin, 0.5 * margin, 3.0 * margin, -margin, 0.2 * margin])
 
-    def evolved(space: object, fit: Fit) -> Fit:
-        asked.append(fit)
+    def evolved(space: object, fit: Fit, draw: int) -> Fit:
+        asked.append(draw)
         return replace(fit, bic=fit.bic - next(gains))
 
     monkeypatch.setattr(type(bench.space), "evolved", evolved)
     monkeypatch.setattr(type(bench.space), "refitted", lambda space, hypothesis, x, iterations=0: replace(stuck, bic=1e9))
-    assert bench.space.deepened(stuck).bic == pytest.approx(stuck.bic - 4.5 * margin) and len(asked) == 3
-    gains = iter([-5.0 * margin])
+    assert bench.space.deepened(stuck).bic == pytest.approx(stuck.bic - 7.7 * margin) and asked == [0, 1, 2, 3, 4, 5]
+    gains = iter([-5.0 * margin, -5.0 * margin])
     assert bench.space.deepened(stuck) is stuck
+    monkeypatch.setattr(type(bench.space), "quiet", lambda space, fit: True)
+    gains = iter([-5.0 * margin])
+    assert bench.space.deepened(stuck) is stuck, "what leaves noise is searched once"
+
+
+def test_where_one_with_impacts_leads_all_of_them_are_searched(monkeypatch: pytest.MonkeyPatch) -> None:
+    bench = Bench({"gap": (0.5,)}, masses=2)
+    gap, alike, plain = (bench.fit(t) for t in (IMPACTS, replace(IMPACTS, name="a"), B))
+    monkeypatch.setattr(type(bench.space), "search", lambda space, fit: replace(fit, bic=fit.bic - 1.0))
+    monkeypatch.setattr(type(bench.space), "quiet", lambda space, fit: False)
+    found = bench.space.searched_alike([gap, alike, plain])
+    assert [f.bic for f in found] == [gap.bic - 1.0, alike.bic - 1.0, plain.bic]
+    leads = replace(plain, bic=gap.bic - 1e3)
+    assert bench.space.searched_alike([gap, leads]) == [gap, leads], "another effect leads"
 
 
 def test_demoted_takes_a_linear_model_too() -> None:

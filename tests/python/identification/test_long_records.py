@@ -9,10 +9,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.stats import f
 
 import gaident as ga
 from gaident.identification.adequacy import independence_p
-from gaident.identification.noise import autocorrelation, autoregression_of, chi2_tail, ljung_box
+from gaident.identification.noise import autocorrelation, autoregression_of, ljung_box
 from gaident.identification.parts import search_parts
 from gaident.identification.space import derive_space
 from gaident.models.drive_torque import torque_of
@@ -183,6 +184,18 @@ def test_independence_test_equals_the_projection_of_whole_arrays() -> None:
         directions = np.linalg.qr(more.T)[0]
         explained = float(np.sum((directions.T @ rest) ** 2))
         left = float(rest @ rest) - explained
-        expected = chi2_tail((300 - 4 - 3 + 1.5) * float(np.log1p(explained / left)), 3)
+        expected = f.sf((explained / 3.0) / (left / (300 - 4 - 3)), 3, 300 - 4 - 3)
         assert independence_p(rows @ rows.T, len(own), 300) == pytest.approx(expected, rel=1e-6)
         assert (expected < 1e-3) == (strength > 0.0)
+
+
+def test_a_short_record_without_dependence_is_falsified_as_often_as_the_level_says() -> None:
+    """With 6 samples more than columns the limit of many samples finds 0.002 for a p of 0.01."""
+    rng = np.random.default_rng(6)
+    found = []
+    for _ in range(4000):
+        rows = rng.standard_normal((1 + 4 + 8, 18))
+        found.append(independence_p(rows @ rows.T, 4, 18))
+    p = np.array(found)
+    for level in (0.01, 0.1, 0.5):
+        assert np.mean(p < level) == pytest.approx(level, abs=4.0 * (level * (1.0 - level) / len(p)) ** 0.5)

@@ -13,8 +13,9 @@ import numpy as np
 import pytest
 
 import gaident as ga
+from effect_sizes import SIZES
 from gaident.errors import ModelError
-from gaident.models.factors import FactorCounts
+from gaident.models.factors import FactorCounts, factor_parameters
 from gaident.models.own_effects import OWN, Parameter, starts
 from gaident.models.simulate_many import simulate_values
 from places import ROOT
@@ -85,6 +86,92 @@ def test_a_built_in_effect_written_again_is_the_same(
     assert changed > 0.01
     np.testing.assert_allclose(mine.velocity, theirs.velocity, rtol=0.0, atol=tolerance * changed)
     np.testing.assert_allclose(mine.position, theirs.position, rtol=0.0, atol=tolerance * np.abs(theirs.position).max())
+
+
+AT_LOAD = [row for row in COUNTERPARTS if row[2] in ("torque", "friction")]
+
+
+@pytest.mark.parametrize("beside", ["", "stribeck_friction", "hysteretic_coupling"])
+@pytest.mark.parametrize(("name", "values", "acts", "function"), AT_LOAD, ids=[t[0] for t in AT_LOAD])
+def test_a_built_in_effect_at_the_load_written_again_is_the_same(
+    beside: str, name: str, values: dict[str, float], acts: str, function: Callable[..., Any]
+) -> None:
+    row = next(r for r in effects.table() if r.name == name)
+    given = [p._replace(lowest=-10.0 if p.name in ("rate", "phase") else 0.0, highest=10.0) for p in row.parameters]
+    effects.register("mine", given, meaning="the same again", **{acts: function})
+    drive = TWO.with_effect(beside, **SIZES[beside]) if beside else TWO
+    for loop, controller in LOOPS.items():
+        rec = record(controller)
+        without = ga.simulate(drive, rec, controller, substeps=8 if beside else None)
+        theirs = ga.run(drive.with_effect(name, side="load", **values), rec, controller, substeps=8)
+        mine = ga.run(drive.with_effect("mine", side="load", **values), rec, controller, substeps=8)
+        changed = np.abs(theirs.velocity - without).max()
+        tolerance = 5e-3 if name == "quadratic_drag" else 1e-9
+        assert changed > 0.01, loop
+        np.testing.assert_allclose(mine.velocity, theirs.velocity, rtol=0.0, atol=tolerance * changed)
+        np.testing.assert_allclose(mine.position, theirs.position, rtol=0.0, atol=tolerance * np.abs(theirs.position).max())
+
+
+def test_effects_of_ones_own_at_both_ends_are_the_same_alone_side_by_side_and_as_numbers() -> None:
+    effects.register("mine", [parameter("torque")], meaning="dry", friction=lambda s, torque: torque)
+    rec = record(CONTROLLER)
+    one = TWO.with_effect("mine", torque=0.02)
+    models = [one, one.with_effect("mine", side="load", torque=0.05), TWO.with_effect("mine", side="load", torque=0.05), TWO]
+    assert [[e.key for e in m.effects] for m in models] == [["mine"], ["mine", "mine@load"], ["mine@load"], []]
+    rows = ga.simulate_many(models, rec, CONTROLLER)
+    for found, model in zip(rows, models, strict=True):
+        np.testing.assert_array_equal(found, ga.simulate(model, rec, CONTROLLER))
+    dry = TWO.with_effect("coulomb_friction", torque=0.02).with_effect("coulomb_friction", side="load", torque=0.05)
+    np.testing.assert_allclose(rows[1], ga.simulate(dry, rec, CONTROLLER), rtol=0.0, atol=1e-9)
+    assert np.abs(rows[1] - rows[0]).max() > 0.1 and np.abs(rows[1] - rows[2]).max() > 0.1
+    counts = FactorCounts.of(TWO)
+    values = np.concatenate([factor_parameters(TWO)[1], [0.02], [0.05]])
+    fast = simulate_values(counts, ["mine", "mine@load"], values[None, :], rec, CONTROLLER)
+    np.testing.assert_allclose(fast[0], rows[1], rtol=0.0, atol=1e-9)
+    stored = models[1].to_dict()
+    assert [e.get("side") for e in stored["effects"]] == [None, "load"] and ga.Model.from_dict(stored) == models[1]
+    with pytest.raises(ModelError, match="mine at the load needs two masses"):
+        ONE.with_effect("mine", side="load", torque=0.05)
+
+
+def test_an_effect_at_the_load_is_asked_with_the_loads_signals() -> None:
+    seen: list[tuple[float, float]] = []
+
+    def look(s: effects.Signals, size: np.ndarray) -> np.ndarray:
+        seen.append((float(s.velocity[0]), float(s.angle[0])))
+        return 0.0 * size
+
+    effects.register("look", [parameter()], meaning="looks only", torque=look)
+    step = np.full(N, 0.2)
+    rec = ga.Record(DT, torque=step, velocity=np.zeros(N))
+    ends = {}
+    for side in ("motor", "load"):
+        seen.clear()
+        ga.run(TWO.with_effect("look", side=side, size=0.5), rec, substeps=4)
+        ends[side] = np.array(seen).T
+    # The load follows: J_L d^2 theta_L/dt^2 = K_G (theta_M - theta_L) + ..., at first it is behind by the twist.
+    (w_motor, motor), (w_load, load) = ends["motor"], ends["load"]
+    assert np.all(w_load[1:20] < w_motor[1:20]) and np.all(load[1:40] < motor[1:40])
+    h = DT / 4.0
+    np.testing.assert_allclose(
+        np.diff(load)[1:], h * 0.5 * (w_load[1:] + w_load[:-1])[1:], rtol=0.0, atol=2e-3 * np.abs(w_load).max() * h
+    )
+
+
+def test_a_diagnosis_finds_it_at_the_load() -> None:
+    def fan(s: effects.Signals, coefficient: np.ndarray) -> np.ndarray:
+        return -coefficient * s.velocity * np.abs(s.velocity) * np.abs(s.velocity)
+
+    effects.register("fan", [parameter("coefficient", "N m s^3/rad^3", highest=1e-5)], meaning="a fan", torque=fan)
+    command = np.repeat(COMMAND[::40], 80)
+    rec = ga.Record(DT, command=command, velocity=np.zeros(len(command)))
+    run = ga.run(TWO.with_effect("fan", side="load", coefficient=2e-6), rec, CONTROLLER)
+    noise = 0.02 * np.random.default_rng(1).standard_normal(len(command))
+    dia = ga.diagnose(ga.Record(DT, torque=run.torque, velocity=run.velocity + noise))
+    (finding,) = dia.causes
+    assert finding.effect == "fan" and [e.key for e in dia.model.effects] == ["fan@load"]
+    assert finding.parameters["coefficient"].value == pytest.approx(2e-6, rel=0.05)
+    assert "fan at the load" in dia.summary()
 
 
 def dead_zone(s: effects.Signals, width: np.ndarray) -> np.ndarray:

@@ -21,12 +21,14 @@ from places import PACKAGE, ROOT
 MARK = "# no decision: "
 # Numbers with a name in capitals are found wherever a module or class has them.
 # Others stand in no comparison and bound nothing, count no iterations, cut no list, are no default,
-# and no factor of a standard deviation; nor does a local name stand there for them.
+# no factor of a standard deviation or of what a call is given, and no value of a dictionary; nor does a local name stand there
+# for them.
 # Free are these, what only guards a division or stands for no limit, and 2 pi; a 2 is a count, a 2.0 is a factor.
 FREE = (-1, 0, 1, 2)
-# A named number that is compared or bounds looks like one that decides: a few words that only say what it is are no reason.
+# A remark gives one of the reasons that policy/table.py lists, or a sentence: a few words that only say what it is are no reason.
 REASON = re.compile(
-    r"rounding|memory|what an argument may be|of a solver|the step of a difference|a start|a grid|a unit|exact to|by 0|how many"
+    r"\b(rounding|memory|what an argument may be|of a solver|the step of a difference|a start|a grid|a unit|exact to|by 0"
+    r"|how many|a formula|a format|printed|drawn)\b"
 )
 SENTENCE = 10  # words
 BOUNDS = {"max", "min", "maximum", "minimum", "clip"}
@@ -45,6 +47,10 @@ TABLES = {
 # Whole modules in which no number decides.
 DRAWN = {
     "data/formats/mat": "numbers of a file format",
+    "show/report/packing": "the same",
+    **dict.fromkeys(("data/formats/units", "drive/quantities"), "units"),
+    "identification/m_sequence": "feedback of shift registers",
+    **dict.fromkeys(("paper/page", "paper/plots"), "how it is printed and drawn"),
     "cli/demonstration": "the drive of the demonstration",
     **dict.fromkeys(("paper/facts", "paper/experiment", "paper/conventional", "paper/friction"), "the published experiment"),
     **dict.fromkeys(("paper/reproduction", "paper/rig", "paper/tables"), "the same"),
@@ -90,7 +96,7 @@ def numbers_named(text: str) -> list[str]:
                 continue
             names = [n.id for t in targets for n in ast.walk(t) if isinstance(n, ast.Name)]
             reasons = [line.partition(MARK)[2] for line in lines[inner.lineno - 1 : inner.end_lineno]]
-            if numeric(value) and not any(r.strip() for r in reasons):
+            if numeric(value) and not any(map(is_reason, reasons)):
                 found += [n for n in names if re.fullmatch(r"_?[A-Z][A-Z0-9_]*", n)]
     return found
 
@@ -108,7 +114,7 @@ def numbers_compared(text: str) -> list[str]:
             reason = lines[node.lineno - 1].partition(MARK)[2]
             targets = node.targets if isinstance(node, ast.Assign) else [node.target]
             names = {n.id for t in targets for n in ast.walk(t) if isinstance(n, ast.Name) and n.id.isupper()}
-            if not REASON.search(reason) and len(reason.split()) < SENTENCE:
+            if not is_reason(reason):
                 found += sorted(names & used)
     return found
 
@@ -131,6 +137,9 @@ def numbers_inside(text: str) -> list[str]:
             name = getattr(node.func, "attr", getattr(node.func, "id", ""))
             parts = bounded(node) or [a for a in node.args if isinstance(a, ast.Constant) and name in FITS]
             parts += [k.value for k in node.keywords if k.arg in STEPS]
+            parts += [f for a in (*node.args, *(k.value for k in node.keywords)) for f in factors(a)]
+        elif isinstance(node, ast.Dict):
+            parts = [n for value in node.values for n in of_a_table(value)]
         elif isinstance(node, ast.For) and isinstance(node.target, ast.Name) and node.target.id == "_":
             parts = [node.iter]  # so many times the same, as the iterations of a fit
         elif isinstance(node, (ast.FunctionDef, ast.Lambda)):
@@ -144,7 +153,12 @@ def numbers_inside(text: str) -> list[str]:
 def excused(lines: list[str], number: int) -> bool:
     """Whether a line, or a comment that stands alone above it, says why it decides nothing."""
     above = lines[number - 2].strip() if number > 1 else ""
-    return bool(lines[number - 1].partition(MARK)[2].strip() or (above.startswith(MARK) and above[len(MARK) :].strip()))
+    return is_reason(lines[number - 1].partition(MARK)[2]) or (above.startswith(MARK) and is_reason(above[len(MARK) :]))
+
+
+def is_reason(remark: str) -> bool:
+    """Whether a remark gives a reason of the list, or says why in a sentence."""
+    return bool(REASON.search(remark)) or len(remark.split()) >= SENTENCE
 
 
 def local_numbers(function: ast.FunctionDef) -> list[ast.Constant]:
@@ -204,6 +218,30 @@ def of_a_deviation(node: ast.AST) -> list[ast.expr]:
     names = [getattr(side, "attr", getattr(side, "id", "")) for side in (node.left, node.right)]
     factors = [n for n in (node.left, node.right) if isinstance(n, ast.Constant) and isinstance(n.value, float)]
     return list(factors) if any(re.fullmatch(r"std|sigma|.*_std|deviation", name) for name in names) else []
+
+
+def factors(argument: ast.expr) -> list[ast.expr]:
+    """The factors of what a call is given, 0.01 * largest; a half is a mean, and a power of ten from ten on another unit."""
+    if not isinstance(argument, ast.BinOp) or numeric(argument):
+        return []
+    found = [n for n in made_of(argument, (ast.Mult,)) if isinstance(n, ast.Constant) and isinstance(n.value, float)]
+    return [n for n in found if n.value not in (0.5, 1e1, 1e2, 1e3, 1e6)]  # type: ignore[attr-defined]
+
+
+def of_a_table(value: ast.expr) -> Iterator[ast.expr]:
+    """The numbers of a dictionary's value, and of calls in it; a half is a mean, and a text contains none that decide."""
+    if isinstance(value, ast.JoinedStr):
+        return
+    if isinstance(value, ast.Constant) and value.value != 0.5:
+        yield value
+    power = value.right if isinstance(value, ast.BinOp) and isinstance(value.op, ast.Pow) else None
+    for inner in ast.iter_child_nodes(value):
+        if (
+            inner is not power
+            and isinstance(inner, (ast.expr, ast.keyword))
+            and not isinstance(value, (ast.Subscript, ast.Dict, ast.Lambda))
+        ):
+            yield from of_a_table(inner.value if isinstance(inner, ast.keyword) else inner)
 
 
 def literals(node: ast.expr) -> Iterator[ast.Constant]:
@@ -379,6 +417,13 @@ def test_what_counts_as_a_number_of_its_own() -> None:
         ("max(x, 1e-300)", []),
         ("0.25 * x + 3.0", []),
         ("ls.fit(objective, POLICY.usual)", []),
+        ("sums(x, 0.01 * largest)", ["0.01"]),
+        ("sums(x, most=y * 0.02)", ["0.02"]),
+        ("sums(x, 1e3 * dt, 0.5 * (x + y), 2.0 * np.pi * f)", []),
+        ("sums(x, 0.01 * largest)  # no decision: of the largest", ["0.01"]),
+        ("sums(x, 0.01 * largest)  # no decision: the step of a difference", []),
+        ("{'a': (np.log(0.05 * x), f(1e5)), 'b': y}['a']", ["0.05", "100000.0"]),
+        ("{'a': f'{1e3 * x:.3g}', 'b': (0.0, 1.0), 'c': x[3]}", []),
     ],
 )
 def test_what_counts_as_a_number_that_decides(line: str, numbers: list[str]) -> None:

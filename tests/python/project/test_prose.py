@@ -1,4 +1,4 @@
-"""Lines of prose in the sources end where sentences end."""
+"""Lines of prose in the sources and on the pages end where sentences end."""
 
 from __future__ import annotations
 
@@ -24,6 +24,7 @@ SENTENCE_END = re.compile(r"[.!?][)\]\"'`*]*$")
 # A list item, a table's row, a code example.
 LIST_ITEM = re.compile(r"(\d+\.|[-*|]|>>>|\.\.\.) ")
 COMMENT = re.compile(r"(.*?)//+(.*)")
+TITLE = re.compile(r"\A( *(?:(?:\d+\.|-) )?)\*\*[^*]+\*\* +")
 
 
 def docstrings(text: str) -> Iterator[list[Line]]:
@@ -65,6 +66,32 @@ def core_comments(text: str) -> Iterator[list[Line]]:
         yield list(enumerate(found[1].splitlines(), text.count("\n", 0, found.start()) + 1))
 
 
+def pages() -> list[Path]:
+    """The Markdown of the project."""
+    return [
+        *sorted((ROOT / "docs").rglob("*.md")),
+        *(ROOT / name for name in ("README.md", "CONTRIBUTING.md", "bench/README.md")),
+    ]
+
+
+def markdown(text: str) -> list[Line]:
+    """Return the prose of a page: no code (between fences, or indented behind a blank line), no headings, tables and pictures.
+
+    A title in bold at the beginning of a paragraph or of a list item is none of its sentences.
+    """
+    lines: list[Line] = []
+    fenced = code = False
+    before = ""
+    for number, line in enumerate(text.splitlines(), 1):
+        mark = line.lstrip().startswith("```")
+        fenced ^= mark
+        code = line.startswith("    ") and (code or not before.strip())
+        prose = not (fenced or mark or code or line.lstrip().startswith(("|", "#", "<", "![", "$$")))
+        lines.append((number, TITLE.sub(r"\1", line) if prose else ""))
+        before = line
+    return lines
+
+
 def paragraphs(block: list[Line]) -> Iterator[list[Line]]:
     """Cut a comment at blank lines, at list items and where the indent becomes less."""
     paragraph: list[Line] = []
@@ -91,7 +118,10 @@ def run_on(block: list[Line]) -> Iterator[Line]:
 
 def faults(file: Path) -> list[str]:
     text = file.read_text()
-    blocks = [*docstrings(text), *python_comments(text)] if file.suffix in {".py", ".pyi"} else list(core_comments(text))
+    if file.suffix == ".md":
+        blocks = [markdown(text)]
+    else:
+        blocks = [*docstrings(text), *python_comments(text)] if file.suffix in {".py", ".pyi"} else list(core_comments(text))
     return [f"{file.relative_to(ROOT)}:{number}: {line}" for block in blocks for number, line in run_on(block)]
 
 
@@ -100,6 +130,12 @@ def test_lines_of_prose_end_where_sentences_end(folder: Path) -> None:
     files = [f for f in sorted(folder.rglob("*")) if f.suffix in {".py", ".pyi", ".hpp", ".cpp", ".h", ".c"}]
     assert files
     found = [fault for file in files for fault in faults(file)]
+    assert not found, "end the line where the sentence ends:\n" + "\n".join(found)
+
+
+def test_lines_of_prose_end_where_sentences_end_on_the_pages() -> None:
+    assert len(pages()) > 20
+    found = [fault for page in pages() for fault in faults(page)]
     assert not found, "end the line where the sentence ends:\n" + "\n".join(found)
 
 
@@ -121,3 +157,8 @@ def test_a_sentence_that_begins_behind_another_and_runs_on_is_found() -> None:
     ]
     texts = ("int a;  // A mass. It turns\n        // with the motor.\n", "/* A mass. It turns\n   with the motor. */\n")
     assert [len(list(run_on(block))) for text in texts for block in core_comments(text) if block] == [1, 1]
+    page = "# A mass. It turns\n\nA mass. It turns\nwith the motor.\n\n    A mass. It turns\n    with the motor.\n\n"
+    page += (
+        "- **A mass.** It is\n  one. It turns\n  with the motor.\n\n```\nA mass. It turns\nwith the motor.\n```\n| A. B | c |\n"
+    )
+    assert [number for number, _ in run_on(markdown(page))] == [3, 10]

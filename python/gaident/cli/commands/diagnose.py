@@ -58,10 +58,9 @@ def _several(args: Namespace, names: Sequence[str]) -> int | None:
     found: dict[str, tuple[Drive, Diagnosis] | GaidentError] = {}
     written: list[Path] = []
     for name in names:
-        own = Namespace(**{**vars(args), "select": [name]})
-        for option in ("out", "plot", "report", "next_command"):
-            if (path := getattr(args, option)) is not None:
-                setattr(own, option, str(Path(path).with_stem(f"{Path(path).stem}_{name}")))
+        paths = {option: getattr(args, option) for option in ("out", "plot", "report", "next_command")}
+        of_axis = {o: str(Path(path).with_stem(f"{Path(path).stem}_{name}")) for o, path in paths.items() if path is not None}
+        own = Namespace(**{**vars(args), **of_axis, "select": [name]})
         try:
             drive, dia, more = _diagnosed(own)
         except GaidentError as error:

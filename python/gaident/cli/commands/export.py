@@ -23,7 +23,7 @@ from gaident.results.store import load
 
 __all__ = ["export_command"]
 
-PADE = 3  # no decision: of a file for another tool, which says so
+PADE = 3  # no decision: a format: order of a delay in a file for another tool, which says so
 
 
 def export_command(args: argparse.Namespace) -> None:

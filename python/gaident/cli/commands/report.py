@@ -44,7 +44,7 @@ def report_command(args: argparse.Namespace) -> None:
         said = "the page says so" if len(results) == 1 else "they are left out"
         which = "this result" if len(results) == 1 else "any of these results"
         print(f"not the data of {which}, by their hash: {', '.join(unknown)}; {said}")
-    # no decision: how a size is printed
+    # no decision: printed: a size
     print(f"written: {target} ({f'{size / 1e6:.1f} MB' if size > 1e6 else f'{size / 1e3:.0f} kB'})")
 
 

@@ -97,7 +97,7 @@ def _careful(
         if len(row) != dialect.width or (trailing and row[-1]):
             found, usual = len(row) - (trailing and not row[-1]), dialect.width - trailing
             raise ReadError(
-                # no decision: how much of a line a message quotes
+                # no decision: printed: of a line in a message
                 f"{path}, line {number}: {found} fields where the other lines have {usual}: {text[:60]!r}; "
                 f"correct or remove this line (a damaged row or a footer?)"
                 f"{_comma_hint(dialect, found - usual)}"

@@ -106,7 +106,7 @@ def detect(path: str, lines: Sequence[Line], delimiter: str | None, decimal: str
 def _weigh(rows: list[list[str]], delimiter: str, decimal: str) -> tuple[Dialect, tuple[float, float]]:
     """A candidate, and (numeric cells per line, minus text cells per line): the larger the better."""
     width = Counter(len(row) for row in rows).most_common(1)[0][0]
-    # no decision: comma is not the delimiter where another mark is
+    # no decision: a format: comma is not the delimiter where another mark is
     others = [mark for mark in _DELIMITERS[:3] if mark != delimiter]
     table = [row for row in rows if len(row) == width]
     pattern = _NUMBER[decimal]
@@ -165,4 +165,4 @@ def _digits_only(text: str) -> bool:
 
 
 def _short(text: str) -> str:
-    return text if len(text) <= 60 else text[:57] + "..."  # no decision: how much of a line a message quotes
+    return text if len(text) <= 60 else text[:57] + "..."  # no decision: printed: of a line in a message

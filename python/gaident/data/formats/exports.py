@@ -23,7 +23,7 @@ END_MARK = "EOF"
 _SAMPLE_TIME = re.compile(r"SampleTime\s*\[ms\]", re.IGNORECASE)
 _SCOPE_DELIMITERS = "\t;,|"
 _DECIMAL = {",": re.compile(r"\d,\d"), ".": re.compile(r"\d\.\d")}
-_TOP = 80  # no decision: lines in which a header ends; lines
+_TOP = 80  # no decision: a format: lines in which a header ends
 
 
 def scope_layout(lines: Sequence[Line]) -> tuple[Dialect, Header] | None:
@@ -33,7 +33,7 @@ def scope_layout(lines: Sequence[Line]) -> tuple[Dialect, Header] | None:
     SymbolName, Unit, ...) whose label stands above each time column again; rows end early where slower channels have no
     more values.
     """
-    # no decision: how such a file begins
+    # no decision: a format: how such a file begins
     if not lines or not lines[0][1].startswith("Name") or len(lines[0][1]) < 5 or lines[0][1][4] not in _SCOPE_DELIMITERS:
         return None
     delimiter = lines[0][1][4]

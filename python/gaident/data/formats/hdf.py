@@ -38,7 +38,7 @@ def open_hdf(path: str, file: Path, stack: ExitStack) -> LogTable:
 
 def _is_matlab(file: Path) -> bool:
     with open(file, "rb") as stream:
-        return stream.read(10) == b"MATLAB 7.3"  # no decision: how such a file begins
+        return stream.read(10) == b"MATLAB 7.3"  # no decision: a format: how such a file begins
 
 
 class _Content:

@@ -120,12 +120,12 @@ def _mdf_columns(path: str, mdf: Any) -> tuple[list[Column], list[str]]:
 
 def _outside(group: Any, channel: Any) -> bool:
     """Whether the bits of a channel lie outside the record of its group, in MDF of version 3 or 4."""
-    size = 8 * int(group.samples_byte_nr)  # no decision: bits of a byte
+    size = 8 * int(group.samples_byte_nr)  # no decision: a unit: bits of a byte
     if hasattr(channel, "start_offset"):
-        # no decision: bits of a byte
+        # no decision: a unit: bits of a byte
         return 8 * int(channel.additional_byte_offset) + int(channel.start_offset) + int(channel.bit_count) > size
     in_record = channel.channel_type in (0, 2)  # values of fixed length, master; others are computed, or stand elsewhere
-    # no decision: bits of a byte
+    # no decision: a unit: bits of a byte
     return in_record and 8 * int(channel.byte_offset) + int(channel.bit_offset) + int(channel.bit_count) > size
 
 

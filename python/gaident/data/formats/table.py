@@ -27,7 +27,7 @@ _LISTED = 40  # no decision: how many columns a message names
 
 def first_line(error: BaseException) -> str:
     """What an error of another library says, for a message of one line."""
-    return (str(error).splitlines() or [type(error).__name__])[0][:120]  # no decision: how much of an error is quoted
+    return (str(error).splitlines() or [type(error).__name__])[0][:120]  # no decision: printed: of an error
 
 
 class Stored:

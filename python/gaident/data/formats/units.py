@@ -13,7 +13,7 @@ from gaident.errors import ReadError
 
 __all__ = ["QUANTITIES", "Constants", "factor", "is_any_unit", "is_unit", "known_units", "needed_constant", "of_other_axis"]
 
-_TURN = 2.0 * math.pi  # no decision: rad
+_TURN = 2.0 * math.pi  # no decision: a unit; rad
 
 _COUNTS = ("counts_per_turn", "[counts per turn, after edge evaluation]")
 _AMPERE = ("torque_constant", "[N m/A, or N/A]")

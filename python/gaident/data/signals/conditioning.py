@@ -13,7 +13,7 @@ from gaident.errors import RecordError
 
 __all__ = ["differentiate", "low_pass"]
 
-_ORDER = 4  # no decision: of a low-pass
+_ORDER = 4  # no decision: a formula: the order of a low-pass
 _SHORTEST_EXTENSION = 15  # no decision: within so many samples beyond the ends a filter settles, and more of them change nothing
 
 
@@ -65,7 +65,7 @@ def differentiate(position: ArrayLike, dt: float, cutoff_hz: float | None = None
 
 def low_pass(x: NDArray[np.float64], dt: float, cutoff_hz: float) -> NDArray[np.float64]:
     """The filter of `differentiate` alone. Raises RecordError for a corner that is not between 0 and 1/(2 dt)."""
-    nyquist = 0.5 / dt  # no decision: the Nyquist frequency
+    nyquist = 0.5 / dt  # no decision: a formula: the Nyquist frequency
     cutoff_hz = positive_number(cutoff_hz, "cutoff_hz", "Hz", f"give a corner between 0 and {nyquist:g} Hz, or None")
     if cutoff_hz >= nyquist:
         raise RecordError(
@@ -76,9 +76,9 @@ def low_pass(x: NDArray[np.float64], dt: float, cutoff_hz: float) -> NDArray[np.
     from scipy.signal import butter, sosfiltfilt
 
     # The odd extension at the ends must outlast the filter's transient, or a start in motion would be distorted.
-    # no decision: twice the filter's transient
+    # no decision: a formula: twice the filter's transient
     extension = max(_SHORTEST_EXTENSION, math.ceil(min(2.0 / (cutoff_hz * dt), float(x.size))))
-    sections = butter(_ORDER, cutoff_hz * 2.0 * dt, output="sos")
+    sections = butter(_ORDER, cutoff_hz * 2.0 * dt, output="sos")  # no decision: a formula
     # The straight line between the ends passes such a filter as it is.
     # Taken off first, it costs no digits when the encoder's offset is large,
     # and a record of constant speed stays exact up to its ends.

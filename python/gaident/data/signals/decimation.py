@@ -11,13 +11,13 @@ from gaident.errors import RecordError
 
 __all__ = ["Decimator", "decimated", "factor_of", "low_passed"]
 
-_HALF = 25  # no decision: taps of a low-pass
+_HALF = 25  # no decision: a formula: a low-pass
 """Taps on each side, in samples of the decimated signal."""
 
-_KAISER = 8.0  # no decision: taps of a low-pass
+_KAISER = 8.0  # no decision: a formula: a low-pass
 """beta: what leaks is 72 dB down."""
 
-_CORNER = 0.9  # no decision: taps of a low-pass
+_CORNER = 0.9  # no decision: a formula: a low-pass
 """-6 dB, of the new Nyquist frequency; with these taps the band passes up to 0.8 and is stopped from 1.0 on."""
 
 

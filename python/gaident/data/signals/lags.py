@@ -83,7 +83,7 @@ def _half_width(a: Vector) -> float:
     """Samples in which the autocorrelation falls to a half."""
     lags, correlation = _correlation(a, a)
     right = correlation[np.searchsorted(lags, 0) :]
-    below = np.flatnonzero(right < 0.5)  # no decision: half of the width of a peak, by definition
+    below = np.flatnonzero(right < 0.5)  # no decision: a formula: the width of a peak
     return float(below[0]) if below.size else len(right) / 4.0
 
 
@@ -103,7 +103,7 @@ def _correlation(a: Vector, b: Vector) -> tuple[Vector, Vector]:
         va, vb = sums(a * a, ones_b) - sa**2 / count, sums(ones_a, b * b) - sb**2 / count
         # Where little moves in what is shared, a correlation says nothing.
         usable = count >= POLICY.overlap * min(len(a), len(b))
-        # no decision: where nothing moves there is no correlation
+        # no decision: no division by 0: where nothing moves there is no correlation
         usable &= (va > 1e-3 * count * a.var()) & (vb > 1e-3 * count * b.var())
         correlation = (sums(a, b) - sa * sb / count) / np.sqrt(np.where(usable, va * vb, np.inf))
     return np.arange(1.0 - len(b), len(a)), np.where(usable, correlation, 0.0)
@@ -136,7 +136,7 @@ def refine(
     t = offset + (1.0 + rate) * own
     used = (t >= margin) & (t <= (len(x) - 1) * dt - margin)
     s, z = own[used], smooth[used]
-    if len(s) < 20:  # no decision: fewer contain no fit of four numbers
+    if len(s) < 20:  # no decision: how many samples a fit of four numbers needs
         return None
     width = 2.0 * _half_width(smooth - smooth.mean()) * their_dt
     centre = float(s.mean())
@@ -206,9 +206,9 @@ def _shared_band(x: Vector, dt: float, y: Vector, their_dt: float, offset: float
 def _sandwich(J: Vector, e: Vector) -> Vector:
     """Covariance of the parameters, with Bartlett's weights over the lags."""
     n = len(e)
-    # no decision: bandwidth of an estimate of variance
+    # no decision: a formula: the bandwidth of an estimate of variance
     r = np.array([e[: n - k] @ e[k:] for k in range(min(n // 4, 400))]) / max(float(e @ e), 1e-300)
-    quiet = np.flatnonzero(np.abs(r) < 2.0 / np.sqrt(n))  # no decision: bandwidth of an estimate of variance
+    quiet = np.flatnonzero(np.abs(r) < 2.0 / np.sqrt(n))  # no decision: a formula: the bandwidth of an estimate of variance
     reach = min(2 * (int(quiet[0]) if quiet.size else len(r)) + 1, n // 2)
     scale = np.linalg.norm(J, axis=0) + 1e-300
     scores = (J / scale) * e[:, None]

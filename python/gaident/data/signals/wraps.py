@@ -31,7 +31,7 @@ _INTEGERS = (float(2**16), float(2**32))  # of an integer that overflows
 
 def _clean(x: Vector, usual: Sequence[float]) -> tuple[NDArray[np.intp], Vector]:
     """(n of each clean jump from x(n) to x(n+1), what it lacks of M: the mean step beside it)."""
-    if len(x) < 4:  # no decision: a jump with a step on either side
+    if len(x) < 4:  # no decision: how many values a jump with a step on either side has
         return np.zeros(0, dtype=np.intp), np.zeros(0)
     d = np.diff(x)
     at = np.flatnonzero(np.abs(d[1:-1]) >= POLICY.wrap_jump * float(np.ptp(x))) + 1
@@ -43,7 +43,7 @@ def _clean(x: Vector, usual: Sequence[float]) -> tuple[NDArray[np.intp], Vector]
     steady = (
         (sign * before > 0.0) & (sign * after > 0.0) & (np.minimum(np.abs(before), np.abs(after)) >= POLICY.wrap_steady * beside)
     )
-    # no decision: digits that a range is logged with
+    # no decision: rounding: digits that a range is logged with
     known = np.array([any(abs(m - s) <= 1e-3 * m for m in usual) for s in size + lacking], dtype=bool)
     came = sign * (x[at] - x[np.maximum(at - POLICY.wrap_reach, 0)])
     went = sign * (x[np.minimum(at + 1 + POLICY.wrap_reach, len(x) - 1)] - x[at + 1])
@@ -84,7 +84,8 @@ class Unwrapper:
         d = np.diff(x)
         found = np.abs(d[at]) + lacking
         period = float(np.median(found))
-        slack = max(float(np.abs(d[at - 1] - d[at + 1]).max()), 1e-3 * period)  # no decision: digits that a range is logged with
+        # no decision: rounding: digits that a range is logged with
+        slack = max(float(np.abs(d[at - 1] - d[at + 1]).max()), 1e-3 * period)
         near = [m for m in self.usual if abs(m - period) <= slack and m >= float(np.ptp(x))]
         period = min(near, key=lambda m: abs(m - period), default=period)
         rest = np.abs(d - period * np.round(d / period))

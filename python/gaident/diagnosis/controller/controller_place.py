@@ -267,7 +267,7 @@ def _fitted(data: DataSet, scales: Scales, term: Term) -> tuple[float, float]:
     costs = [cost(z) for z in grid]
     k = int(np.argmin(costs))
     bracket = (grid[max(k - 1, 0)], grid[min(k + 1, len(grid) - 1)])
-    found = minimize_scalar(cost, bounds=bracket, method="bounded", options={"xatol": 1e-7})
+    found = minimize_scalar(cost, bounds=bracket, method="bounded", options={"xatol": 1e-7})  # no decision: of a solver
     return (float(np.exp(found.x)), float(found.fun)) if found.fun < costs[k] else (float(np.exp(grid[k])), costs[k])
 
 

@@ -40,7 +40,7 @@ FILTER_NAMES = {
     "command_filters": "command_filter",
 }
 """Argument of `Cascade` -> name of the finding."""
-KP_W, KP_R, KI, FIRST_FEED = 0, 1, 2, 3  # no decision: places in (kp, kp b, ki, a_ff, f_ff, starts)
+KP_W, KP_R, KI, FIRST_FEED = 0, 1, 2, 3  # no decision: a formula: places in (kp, kp b, ki, a_ff, f_ff, starts)
 GAINS = {"kp": KP_W, "ki": KI}
 
 

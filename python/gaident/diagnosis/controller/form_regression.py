@@ -25,7 +25,7 @@ from gaident.control.ticks import at_the_clock, between_lines
 from gaident.data.record import Record
 from gaident.identification.logged_stretches import centred, correlation_of, log_of, numbered, whitened
 from gaident.identification.logged_torque import noise_between
-from gaident.identification.number_ranges import FREQUENCIES, TIME_CONSTANTS
+from gaident.identification.number_ranges import FREQUENCIES, TIME_CONSTANTS, range_of
 from gaident.identification.replay.replay import rounding_of
 from gaident.policy.table import POLICY
 
@@ -49,7 +49,7 @@ Matrix = NDArray[np.float64]
 Place: TypeAlias = tuple[str, type[LowPass] | type[Notch]]
 """(argument of `Cascade`, kind of filter)."""
 
-FILTER_STEP = 1e-5  # no decision: of a filter's number, for a slope
+FILTER_STEP = 1e-5  # no decision: the step of a difference; of a filter's number
 PLACES: tuple[Place, ...] = (
     ("torque_filters", LowPass),
     ("torque_filters", Notch),
@@ -63,11 +63,8 @@ FILTER_SETS_OF_ONE = FILTER_SETS[: 1 + len(PLACES)]
 
 # Starts of the search: a low pass in samples, a notch as share of the sampling frequency, and its dampings.
 NOTCHES = tuple(product(FREQUENCIES, ((0.1, 0.7), (0.3, 1.5))))
-BOUNDS = {
-    LowPass: ((np.log(0.05),), (np.log(1e5),)),
-    Notch: ((np.log(1e-4), 0.0, np.log(5e-3)), (np.log(0.495), 5.0, np.log(10.0))),
-}
-"""Of the numbers searched: ln(tau/T); ln(f T), zn, ln(zd)."""
+NUMBERS = {LowPass: ("time_constant",), Notch: ("frequency", "numerator_damping", "denominator_damping")}
+"""Of each filter, searched as ln(tau/T); ln(f T), zn, ln(zd)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -114,7 +111,7 @@ class Law:
             else:
                 seen[place] = filtered(b, a, seen[place][None, :], ticks)[0]
         r, w = seen["command_filters"], seen["velocity_filters"]
-        half = 0.5 * self.period * np.ones(2)  # no decision: the trapezoidal rule
+        half = 0.5 * self.period * np.ones(2)  # no decision: a formula: the trapezoidal rule
         integral = filtered(half, np.array([1.0, -1.0]), (r - w)[None, :], ticks)[0]
         ends = np.cumsum(ticks) - 1
         slope = np.append(np.diff(self.command), 0.0) / self.period
@@ -224,7 +221,7 @@ def quiet_law(law: Law, memory: int) -> Law | None:
         size = np.abs(law.torque[at : at + length])
         at += length
         loud = size > POLICY.quiet_torque * float(size.max())
-        around = np.convolve(loud, np.ones(memory + ahead + 1))[ahead : ahead + length] > 0.5  # no decision: one of them
+        around = np.convolve(loud, np.ones(memory + ahead + 1))[ahead : ahead + length] > 0.5  # no decision: rounding of a count
         begins = ~around & np.append(True, around[:-1])
         parts.append(np.where(around, -1, np.cumsum(begins) - 1))
     stretch = numbered(parts)
@@ -319,8 +316,7 @@ def fitted_shape(law: Law, places: tuple[Place, ...], enough: float) -> Shape:
 
 def bounds_of(places: Sequence[Place]) -> tuple[Vector, Vector]:
     """(lowest, highest) of the filters' numbers."""
-    none = [np.zeros(0)]
-    low, high = (np.concatenate(none + [np.array(BOUNDS[kind][side]) for _, kind in places]) for side in (0, 1))
+    low, high = np.array([range_of(name, 1.0) for _, kind in places for name in NUMBERS[kind]]).reshape(-1, 2).T
     return low, high
 
 

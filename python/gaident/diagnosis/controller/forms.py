@@ -189,7 +189,7 @@ def _price(law: Law, count: int, chosen: int) -> float:
     n = len(law.logged)
     if law.every == 1:
         return cost_of(count, n) + POLICY.form_choice * chosen
-    return float(-2.0 * n * np.log(POLICY.each_number) * (count + chosen))
+    return float(-2.0 * n * np.log(POLICY.each_number) * (count + chosen))  # no decision: a formula
 
 
 def _slopes(law: Law, shape: Shape) -> Matrix:
@@ -257,7 +257,8 @@ def _shown_slowly(
 
 def _shown_quietly(records: Sequence[Record], law: Law, given: PI, floor: float, unknown: tuple[str, ...]) -> Shown | None:
     """The same where it follows at small torques only: the comparison uses only samples at which no limit acts."""
-    for memory in (POLICY.filter_memory, POLICY.filter_memory // 4):  # no decision: a quarter
+    # no decision: a quarter of it where few samples are left, as the row of filter_memory says
+    for memory in (POLICY.filter_memory, POLICY.filter_memory // 4):
         quiet = quiet_law(law, memory)
         candidates = [] if quiet is None else _compared(quiet, given, floor, unknown)
         if quiet is None or not candidates:

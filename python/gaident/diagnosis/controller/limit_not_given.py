@@ -56,5 +56,6 @@ def _least(error: Callable[[float], float], top: float) -> float:
     values = [error(float(np.exp(x))) for x in grid]
     best = int(np.argmin(values))
     low, high = grid[max(best - 1, 0)], grid[min(best + 1, len(grid) - 1)]
+    # no decision: of a solver
     found = minimize_scalar(lambda x: error(float(np.exp(x))), bounds=(low, high), method="bounded", options={"xatol": 1e-6})
     return min(values[best], float(found.fun))

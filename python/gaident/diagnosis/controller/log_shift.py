@@ -47,7 +47,7 @@ __all__ = ["Aligned", "aligned"]
 Vector = NDArray[np.float64]
 
 REFUTED = say("the given controller does not make this {torque}, and without it")
-SHARES = (0.0, 0.5, -0.5)  # no decision: the rules that exist
+SHARES = (0.0, 0.5, -0.5)  # no decision: a formula: the rules of differencing that exist
 """Of ki dt, by which the newest error counts more than half: trapezoidal and rectangular integrals."""
 
 
@@ -225,7 +225,7 @@ def _of_motion(lag: TorqueLag, refuted: bool) -> tuple[Mapping[str, int], Text]:
         return {}, Text("")
     whole = round(lag.lag)
     apart = abs(lag.lag - whole)
-    told = apart + POLICY.contradiction * lag.std < 0.5  # no decision: from a half sample
+    told = apart + POLICY.contradiction * lag.std < 0.5  # no decision: rounding: the nearest whole number
     if lag.lag > 0.0 and apart < POLICY.lag_whole and told:
         text = (
             "The motion comes {} before the logged {torque} that makes it, which no axis does: the log wrote the {torque} {} "

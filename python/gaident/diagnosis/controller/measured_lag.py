@@ -60,7 +60,7 @@ class Lag:
             "ms, to white noise of {:.2g} {N m} rms. What the controller makes, without that noise, drives the model; the lag "
             "is between it and the shaft."
         )
-        ms = 1e3  # no decision: in a second
+        ms = 1e3  # no decision: a unit: in a second
         return say(text, ms * self.time_constant, ms * self.std, self.noise)
 
 

@@ -66,7 +66,8 @@ def run_error(records: Sequence[Record], controller: Cascade) -> float:
 
 def too_fast(controller: Cascade, dt: float) -> bool:
     """Whether a notch of the controller lies where a log with the sample time dt [s] shows nothing."""
-    return any(isinstance(f, Notch) and f.frequency > 0.5 / dt for f in controller.torque_filters)  # no decision: Nyquist
+    # no decision: a formula: the Nyquist frequency
+    return any(isinstance(f, Notch) and f.frequency > 0.5 / dt for f in controller.torque_filters)
 
 
 def limited(records: Sequence[Record], controller: Cascade) -> Limited:
@@ -106,7 +107,7 @@ def _spread(records: Sequence[Record], limit: float) -> float:
     """Deviation of the torques at a limit [N m], no less than their rounding makes."""
     torque = np.concatenate([r.torque for r in records if r.torque is not None])
     at_limit = np.abs(torque)[np.abs(torque) >= POLICY.at_limit * limit]
-    rounded = rounding_step(torque) / float(np.sqrt(12.0))  # no decision: of an even distribution
+    rounded = rounding_step(torque) / float(np.sqrt(12.0))  # no decision: a formula: an even distribution
     return max(float(np.std(at_limit)) if len(at_limit) else 0.0, rounded, SUM_ROUNDING * limit)
 
 

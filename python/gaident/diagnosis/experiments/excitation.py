@@ -166,7 +166,7 @@ def _smoothed(x: Vector, width: int) -> Vector:
 
 def _held(smooth: Vector, dt: float, floor: float, top: float) -> tuple[list[float], list[float], list[float]]:
     """Speeds held (velocity within 2 % of the highest, for long enough): all, those of the first and of the last third."""
-    band = 2.0 * max(POLICY.still * top, floor)  # no decision: from one side of a speed to the other
+    band = 2.0 * max(POLICY.still * top, floor)  # no decision: a formula: from one side of a speed to the other
     held, early, late = [], [], []
     n, start = len(smooth), 0
     third = n / 3  # no decision: the first and the last third, for how even a record is

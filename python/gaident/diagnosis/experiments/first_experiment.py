@@ -28,6 +28,7 @@ from gaident.diagnosis.experiments.commands import largest_jump
 from gaident.diagnosis.experiments.excitation import position_of
 from gaident.diagnosis.experiments.menu import MENU, Bench, Builder, prbs_moving, reversals, slow_stairs, speed_ladder, steps
 from gaident.diagnosis.library.settings import OF_SETTING
+from gaident.diagnosis.library.sides import called_of
 from gaident.diagnosis.library.terms import LIBRARY
 from gaident.errors import SettingsError
 from gaident.models.drive_torque import torque_of
@@ -140,10 +141,10 @@ def _first_reason(command: Vector, limits: Limits, inertia: float | None, b: Ben
     parts = [Text(f"No record yet: this triggers {every}, as far as travel allows.")]
     if b.kp is not None:
         text = (
-            "No record yet: this triggers {} but torque saturation, as far as travel allows: its largest jump, of "
+            "No record yet: this triggers {} but {}, as far as travel allows: its largest jump, of "
             "{:.3g} {rad/s}, asks for {:.3g} of {:.3g} {N m}."
         )
-        parts = [say(text, every, jump, b.kp * jump, limits.torque)]
+        parts = [say(text, every, called_of(OF_SETTING["torque_limit"]), jump, b.kp * jump, limits.torque)]
     else:
         top = float(np.abs(command).max())
         text = (

@@ -118,8 +118,7 @@ def _tuned(plant: Discretised, u: Vector, w: Vector, noise: float | None, walk: 
             steady = _Filter(plant, level, ratio * level)
             v = steady.innovations(u, w)
             scale = float(np.sqrt(v @ v / len(v) / steady.F)) if noise is None and walk is None else 1.0
-            steady.F *= scale**2
-            tried[decade] = (scale * level, ratio * scale * level, steady.log_likelihood(v))
+            tried[decade] = (scale * level, ratio * scale * level, steady.log_likelihood(v, scale))
         return tried[decade][2]
 
     best = max(DECADES, key=value)
@@ -186,9 +185,10 @@ class _Filter:
         """row L^n, n = 0.. (samples, m+1)."""
         return recursion(self.L.T, np.zeros((samples, len(self.B))), row)
 
-    def log_likelihood(self, v: Vector) -> float:
-        """Of innovations, Gaussian."""
-        return -0.5 * (len(v) * float(np.log(2.0 * np.pi * self.F)) + float(v @ v) / self.F)
+    def log_likelihood(self, v: Vector, scale: float = 1.0) -> float:
+        """Of innovations, Gaussian; scale: of both deviations, which changes the variance of innovations alone."""
+        F = self.F * scale**2
+        return -0.5 * (len(v) * float(np.log(2.0 * np.pi * F)) + float(v @ v) / F)
 
     def smooth(self, u: Vector, w: Vector) -> tuple[Vector, Vector, Vector]:
         """(dhat, smoothed velocity, innovations)."""

@@ -203,8 +203,10 @@ def _of_the_controller(
 
     That is numbers of the controller, or how old the velocity is against the torque.
     """
-    mostly = [name for name, e in mechanics.items() if 2.0 * e.of_controller**2 > e.std**2 > 0.0]  # no decision: half of it
-    by_age = [name for name in mostly if 2.0 * ages.get(name, 0.0) ** 2 > mechanics[name].of_controller ** 2]  # no decision: half
+    # no decision: a formula: more than half of a variance
+    mostly = [name for name, e in mechanics.items() if 2.0 * e.of_controller**2 > e.std**2 > 0.0]
+    # no decision: a formula: more than half of a variance
+    by_age = [name for name in mostly if 2.0 * ages.get(name, 0.0) ** 2 > mechanics[name].of_controller ** 2]
     by_numbers = [name for name in mostly if name not in by_age]
     numbers = (
         "the numbers of the controller that were left open: give them."

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from gaident.estimation.term import Natural, Rows
 
-HIGHEST_ORDER = 64  # no decision: which effects there are
+HIGHEST_ORDER = 64  # no decision: what an argument may be
 """Of cogging and encoder ripple that a drive is expected to have [1/turn]."""
 
 Vector = NDArray[np.float64]

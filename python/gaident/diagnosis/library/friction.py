@@ -46,7 +46,7 @@ def _place_coordinates(p: Mapping[str, float]) -> Vector:
 
 
 def _place_steps(s: Scales) -> tuple[float, ...]:
-    order = 0.05 / s.travel if s.period_seen else 0.0  # no decision: rad over the travel
+    order = 0.05 / s.travel if s.period_seen else 0.0  # no decision: the step of a difference; rad over the travel
     return (_steps(s), _steps(s), _steps(s), order)
 
 

@@ -14,7 +14,7 @@ from gaident.estimation.term import PHASE, Rows, Scales
 
 __all__ = ["FREE", "harmonic", "linear", "single"]
 
-FREE = 1e6  # no decision: a bound that nothing reaches;
+FREE = 1e6  # no decision: what an argument may be: a bound that nothing reaches;
 """Times the largest torque of the log: a pendulum that swings with little friction has far more torque than drives it."""
 
 Vector = NDArray[np.float64]
@@ -84,7 +84,7 @@ def harmonic(effect: str, place: str, first: int, with_order: bool, kind: str, *
 
     def steps(s: Scales) -> tuple[float, ...]:
         a = 0.05 * amplitude(s)
-        order = 0.05 / s.travel if s.period_seen else 0.0  # no decision: rad over the travel
+        order = 0.05 / s.travel if s.period_seen else 0.0  # no decision: the step of a difference; rad over the travel
         return (a, a, order)[: 3 if with_order else 2]
 
     turning = {"phase": PHASE}

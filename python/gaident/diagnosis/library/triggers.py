@@ -291,7 +291,7 @@ def slope_beyond(s: Motions) -> Text | None:
 def resonance_beyond(s: Motions) -> Text:
     """Resonances that are too fast for the sampling, of a shaft or another one."""
     dt = max(m.dt for m in s.records)
-    highest = 0.5 / dt  # no decision: half the sampling frequency
+    highest = 0.5 / dt  # no decision: a formula: half the sampling frequency
     if any(m.measured for m in s.records):
         text = (
             "one of a shaft above {:.3g} Hz would not have been named, as a measured {torque} is not known between the lines of "
@@ -307,7 +307,7 @@ def orders_beyond(s: Motions) -> Text | None:
     one = _per_turn(s)
     reached = s.travel * one / TURN  # periods of the first order
     least = math.ceil(POLICY.seen_periods / reached) if reached > 0.0 else HIGHEST_ORDER
-    if least == 2 and reached > POLICY.seen_turn:  # no decision: the second order, below which the first one shows
+    if least == 2 and reached > POLICY.seen_turn:  # no decision: a formula: the second order, below which the first one shows
         least = 1
     per_sample = max(_slowest_held(m) * m.dt for m in s.records)
     fastest = math.floor(POLICY.seen_band * math.pi / per_sample / one) if per_sample > 0.0 else None

@@ -41,15 +41,27 @@ class Library(Mapping[str, Cause]):
             return self._at_load[effect]
         name = name_of(effect)
         if name in self._built_in and self._built_in[name].other_side == effect:
-            linear = frozenset(t.name for t in self._built_in.values() if t.resonates)
-            return self._at_load.setdefault(effect, at_load(self._built_in[name], linear))
-        row = next((row for row in table() if row.own and row.name == effect), None)
+            return self._at_load.setdefault(effect, at_load(self._built_in[name], self._linear()))
+        row = next((row for row in table() if row.own and row.name == name), None)
         if row is None:
             raise KeyError(effect)
         known = self._own.get(effect)
         if known is None or known[0] is not row:
-            known = self._own[effect] = (row, _term(row))
+            known = self._own[effect] = (row, self._term_of(row, effect))
         return known[1]
+
+    def _term_of(self, row: Row, effect: str) -> Cause:
+        """Of a user-defined effect at the motor, or under its key there at the load."""
+        cause = at_motor(_term(row))
+        if effect == row.name:
+            return cause
+        if effect != cause.other_side:
+            raise KeyError(effect)
+        return at_load(cause, self._linear())
+
+    def _linear(self) -> frozenset[str]:
+        """What changes the mechanism linearly: no effect at the load goes together with it."""
+        return frozenset(t.name for t in self._built_in.values() if t.resonates)
 
     def __iter__(self) -> Iterator[str]:
         yield from self._built_in

@@ -37,7 +37,7 @@ def folded(rec: Record) -> bool:
     if u is None or len(w) < WINDOW or not top > 0.0 or float(w.min()) < -POLICY.still * top:
         return False
     around = np.lib.stride_tricks.sliding_window_view(w, WINDOW)
-    # no decision: slopes over two samples
+    # no decision: a formula: slopes over two samples
     before, after = 0.5 * (around[:, 2] - around[:, 0]), 0.5 * (around[:, 4] - around[:, 2])
     usual = float(np.quantile(np.abs(np.diff(w)), POLICY.usual_slope))
     steep = max(POLICY.folded_steep * usual, POLICY.above_noise * noise_std(w))

@@ -16,7 +16,7 @@ __all__ = ["cleaned", "left_out", "outliers", "quantisation", "unexplained"]
 
 Vector = NDArray[np.float64]
 
-ROBUST = 1.4826  # no decision: median absolute deviation of normal noise -> standard deviation
+ROBUST = 1.4826  # no decision: a formula: median absolute deviation of normal noise -> standard deviation
 SECOND = 1.5  # no decision: sqrt(14/6), noise of the line through two samples before over that through the two next ones
 SHORTEST = 7  # no decision: the fewest samples of which all of these differences can be taken at all
 PASSES = 4  # no decision: neighbours hide each other, no more than four in a row; passes end where none is new

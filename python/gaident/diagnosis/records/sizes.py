@@ -27,7 +27,7 @@ def scales_of(data: DataSet) -> Scales:
         torque=torque,
         acceleration=steps or float("inf"),
         travel=max(float(np.ptp(part)) for part in np.split(angle, borders)),
-        friction=0.02 * torque,
+        friction=0.02 * torque,  # no decision: a start
         stiffness=float("nan"),
         resonance=float("nan"),
         two_masses=False,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -13,6 +13,7 @@ from gaident.diagnosis.library.sides import name_of
 from gaident.diagnosis.library.terms import LIBRARY, of_inverse_dynamics
 from gaident.diagnosis.selection.attribution import friction_shown
 from gaident.diagnosis.selection.mechanisms import is_mechanism, one_mass, reduced, resonant, rigid, swings
+from gaident.diagnosis.selection.model_space import Grown
 from gaident.diagnosis.selection.moves import Moves
 from gaident.diagnosis.selection.score_test import ScoreTest
 from gaident.errors import GaidentError, RecordError, SettingsError
@@ -53,6 +54,7 @@ class Task:
     most: int = POLICY.most_effects
     shown: frozenset[str] = frozenset()
     rigid_below: float = 0.0
+    grown: Grown = field(default_factory=Grown)
 
     @property
     def data(self) -> DataSet:
@@ -60,7 +62,7 @@ class Task:
 
     def space(self) -> Moves:
         policy = replace(POLICY, most_effects=self.most)
-        return Moves(self.objective, self.allowed, self.note, policy, self.shown, self.rigid_below)
+        return Moves(self.objective, self.allowed, self.note, policy, self.shown, self.rigid_below, self.grown)
 
     def under(self, family: Innovations | OutputErrors) -> Task:
         return replace(self, objective=self.objective.under(family))
@@ -234,7 +236,7 @@ def _by_output_errors(task: Task) -> ByOutputErrors:
     )
     heaviest = inertia.value + POLICY.heavier * inertia.std if task.data.torque_measured else None
     rigid = axis.force_error**2 < POLICY.rigid_left
-    below = 2.0 * np.pi * POLICY.rigid_band * axis.cutoff_hz if rigid else 0.0  # no decision: rad/s of Hz
+    below = 2.0 * np.pi * POLICY.rigid_band * axis.cutoff_hz if rigid else 0.0  # no decision: a unit; rad/s of Hz
     return ByOutputErrors(replace(raw.task, rigid_below=below).under(OutputErrors(1.0, weight, heaviest)), axis)
 
 
@@ -248,8 +250,8 @@ def _axis(data: DataSet) -> InverseDynamics | None:
         return None
     records, highest = list(data.records), POLICY.highest_band / data.records[0].dt
     cutoffs = [min(cutoff_of(r, ORDER) for r in records)]
-    while 2.0 * cutoffs[-1] <= highest:  # no decision: steps of a search
-        cutoffs.append(2.0 * cutoffs[-1])
+    while 2.0 * cutoffs[-1] <= highest:  # no decision: a grid: octaves
+        cutoffs.append(2.0 * cutoffs[-1])  # no decision: a grid: octaves
     doubtful: InverseDynamics | None = None
     for cutoff in cutoffs:
         try:

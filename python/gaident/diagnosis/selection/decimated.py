@@ -36,7 +36,7 @@ Vector = NDArray[np.float64]
 def decimated(data: DataSet, blocks: int) -> DataSet:
     """The records on the coarser grid, open loop: driven by the torque that the controller issued."""
     records = [decimated_record(data.as_old(r) if data.age else r, blocks) for r in data.driven]
-    finest = max(FINEST, 2.0 * data.dt)  # no decision: the step of a simulation
+    finest = max(FINEST, 2.0 * data.dt)  # no decision: of a solver: the step of a simulation
     found = replace(DataSet.of(records, None), finest=finest, known_noise=data.noise)
     return replace(found, torque_measured=data.torque_measured, axis=data.axis, period=data.period)
 

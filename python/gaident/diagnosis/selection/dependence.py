@@ -14,10 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gaident.control.filtering import clamped_sum
-from gaident.diagnosis.selection.line import torque_of_line
 from gaident.estimation.criterion import cost_of
 from gaident.estimation.least_squares import scored
-from gaident.estimation.noise_model import ShaftNoise
+from gaident.estimation.noise_model import WHITE, ShaftNoise
 from gaident.estimation.objective import Fit, Innovations, Objective
 from gaident.estimation.prediction import coupling_response, twist
 from gaident.estimation.projection import project_out
@@ -89,7 +88,7 @@ def dependence(objective: Objective, fit: Fit) -> Dependence:
         # A frequency that was searched for counts as a number more.
         gain = none - account.bic(pairs) - cost_of(1, objective.information)
         if gain > gains["time"]:
-            gains["time"], line = gain, torque_of_line(objective, fit, J, error, pairs)
+            gains["time"], line = gain, _torque_of_line(objective, fit, J, error, pairs)
     beside = {driver: np.vstack([J, rows]) for driver, rows in columns.items()}
     least = {driver: objective.raw_rest(rows, error) for driver, rows in beside.items()}
     unwhitened = {driver: objective.unwhitened_rest(rows, error) for driver, rows in beside.items()}
@@ -268,3 +267,21 @@ def _peak(spectrum: Vector, k: int) -> float:
     a, b, c = np.log(spectrum[k - 1 : k + 2] + 1e-300)
     curve = a - 2.0 * b + c
     return float(k + (0.5 * (a - c) / curve if curve < 0.0 else 0.0))
+
+
+def _torque_of_line(objective: Objective, fit: Fit, jacobian: Matrix, error: Vector, pairs: Matrix) -> tuple[float, float]:
+    """(frequency [Hz], amplitude [N m]) of a torque a cos(wt) + b sin(wt), fitted to the error beside the model's parameters.
+
+    jacobian (parameters, N) and error (N,) raw; pairs: rows cos(wt), sin(wt) of each record, 0 outside it, t from its start.
+    Of several records the amplitude is the rms of theirs, each by its samples.
+    """
+    answers = fit.predictor.torque_response(fit.parameters, fit.x, pairs)
+    rows = objective.whitened(np.vstack([jacobian, answers]), WHITE)
+    sizes = np.sqrt(np.einsum("ij,ij->i", rows, rows))
+    sizes[sizes == 0.0] = 1.0
+    v = objective.whitened(error[None, :], WHITE)[0]
+    found = np.linalg.lstsq((rows / sizes[:, None]).T, v, rcond=1e-8)[0] / sizes
+    radians_per_sample = float(np.arctan2(pairs[1, 1], pairs[0, 1]))
+    powers = np.sum(found[-len(pairs) :].reshape(-1, 2) ** 2, axis=1)
+    amplitude = float(np.sqrt(np.average(powers, weights=objective.lengths)))
+    return radians_per_sample / (2.0 * np.pi * fit.parameters.scales.dt), amplitude

@@ -169,7 +169,7 @@ def on_a_shaft(objective: Objective, one: Fit, known: float = 0.0) -> list[tuple
 def shafts(one: Fit) -> list[Model]:
     """Two masses of the inertia and damping of one, with the shafts of that grid."""
     K, a = one.parameters.base_values(one.x[None, :])[0]
-    z = 2.0 * SHAFT_DAMPING  # no decision: the 2 of 2 zeta w
+    z = 2.0 * SHAFT_DAMPING  # no decision: a formula: 2 zeta w
     return [
         Model(float(K) / r**2, [-float(a), *quadratic_roots(z * w, w**2)], quadratic_roots(z * w * r, (w * r) ** 2))
         for w in _shaft_frequencies(one) for r in SHAFT_RATIOS
@@ -212,8 +212,8 @@ def _two_masses(parameters: Parameterisation, x: Vector) -> Model:
     if pairs:
         K *= pairs[3] / pairs[1]
     wp, zp, wz, zz = parameters.effect_values(x[None, :], _resonance_of(parameters).name)[0]
-    poles = [complex(-a), *quadratic_roots(2.0 * zp * wp, wp**2)]
-    return Model(K * (wp / wz) ** 2, poles, quadratic_roots(2.0 * zz * wz, wz**2))
+    poles = [complex(-a), *quadratic_roots(2.0 * zp * wp, wp**2)]  # no decision: a formula
+    return Model(K * (wp / wz) ** 2, poles, quadratic_roots(2.0 * zz * wz, wz**2))  # no decision: a formula
 
 
 def moved_to(model: Model, fit: Fit, left_out: str = "") -> tuple[Hypothesis, Vector]:
@@ -284,7 +284,7 @@ def swings(fit: Fit) -> bool:
     if fit.parameters.masses == 1:
         return True
     _, _, e1, e0, f1, f0 = fit.parameters.base_values(fit.x[None, :])[0]
-    twice = 2.0 * POLICY.swing_damping  # no decision: the 2 of 2 zeta w
+    twice = 2.0 * POLICY.swing_damping  # no decision: a formula: 2 zeta w
     return bool(e0 > 0.0 and f0 > 0.0 and abs(e1) < twice * np.sqrt(e0) and abs(f1) < twice * np.sqrt(f0))
 
 

@@ -10,8 +10,9 @@ This is the one decision of the search; its numbers stand in the policy.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Hashable, Iterable
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Hashable, Iterable, Sequence
+from dataclasses import dataclass, field, replace
+from weakref import WeakKeyDictionary
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,13 +24,14 @@ from gaident.diagnosis.selection.mechanisms import as_two_masses, resonance, swi
 from gaident.estimation import least_squares as ls
 from gaident.estimation.criterion import cost_of, effective_samples
 from gaident.estimation.dataset import DataSet
+from gaident.estimation.global_search import evolved
 from gaident.estimation.noise_model import WHITE
 from gaident.estimation.objective import Fit, Hypothesis, Innovations, Objective, OutputErrors
 from gaident.estimation.prediction import ClosedLoop, ObserverLoop, OpenLoop, Predictor
 from gaident.estimation.term import Term
 from gaident.policy.table import POLICY, Policy
 
-__all__ = ["ModelSpace", "representative", "words"]
+__all__ = ["Grown", "ModelSpace", "representative", "words"]
 
 Vector = NDArray[np.float64]
 
@@ -58,6 +60,21 @@ def _linear_part(fit: Fit) -> tuple[Hypothesis, Vector]:
     return hypothesis, x
 
 
+class Grown:
+    """The fits from which a search has grown others, of each model over each objective, in the order in which it did."""
+
+    def __init__(self) -> None:
+        self._fits: WeakKeyDictionary[Objective, dict[Hashable, list[Fit]]] = WeakKeyDictionary()
+
+    def note(self, objective: Objective, model: Hashable, fit: Fit) -> None:
+        """One more fit of a model."""
+        self._fits.setdefault(objective, {}).setdefault(model, []).append(fit)
+
+    def of(self, objective: Objective, model: Hashable) -> Sequence[Fit]:
+        """Those of a model."""
+        return self._fits.get(objective, {}).get(model, ())
+
+
 @dataclass(frozen=True, eq=False)
 class ModelSpace:
     """The models that can be made of a library over one objective, and the moves between them."""
@@ -68,6 +85,7 @@ class ModelSpace:
     policy: Policy = POLICY
     shown: frozenset[str] = frozenset()  # families of effects that the records show by themselves
     rigid_below: float = 0.0  # rad/s, below which the records show one rigid body
+    grown: Grown = field(default_factory=Grown)
 
     # What a model is worth.
 
@@ -193,7 +211,7 @@ class ModelSpace:
         Beside impacts the share is larger: one impact too many leaves an error even with the true parameters.
         Other effects can fit that error.
         """
-        impacts = any(t.impacts for t in simpler.parameters.terms)
+        impacts = simpler.impacts
         if self.quiet(fuller) and not impacts:
             return True
         noise = self.objective.count * self.noise_beside(fuller) ** 2
@@ -313,7 +331,7 @@ class ModelSpace:
         if fit.predictor.closed and self.whitens and not self.data.loop_only:
             # Parameters found in closed loop may be a good start for the open loop, whose errors show more.
             predictors.append(OpenLoop(self.data, fit.predictor.own_angle))
-            if ObserverLoop.possible(self.data) and any(t.impacts for t in fit.parameters.terms):
+            if ObserverLoop.possible(self.data) and fit.impacts:
                 predictors.append(ObserverLoop(self.data, fit.predictor.own_angle))
         if not fit.predictor.own_angle and not self.data.angle_logged and any(t.harmonic for t in fit.parameters.terms):
             predictors.append(replace(fit.predictor, own_angle=True))  # type: ignore[type-var]
@@ -331,25 +349,27 @@ class ModelSpace:
         hypothesis, x = as_two_masses(fit)
         return self.continued(hypothesis, fit, x)
 
-    def evolved(self, fit: Fit) -> Fit:
-        """A global search nearby, in the loop where there is one."""
+    def evolved(self, fit: Fit, draw: int = 0) -> Fit:
+        """A global search nearby, in the loop where there is one; draw: of several from the same fit."""
         predictor = self.closed(fit.predictor) if self.data.fits_in_loop else fit.predictor
         start = replace(fit, hypothesis=fit.hypothesis.driven_by(predictor))
-        key = "evolved", start.key, self.policy.evolution
-        return self.objective.once(key, lambda: self.finished(ls.evolved(self.objective, start, self.policy.evolution)))
+        key = "evolved", start.key, self.policy.evolution, draw
+        return self.objective.once(key, lambda: self.finished(evolved(self.objective, start, self.policy.evolution, draw)))
 
     def deepened(self, fit: Fit) -> Fit:
-        """A model with impacts, searched globally nearby until that brings no more.
+        """A model with impacts, searched globally nearby until further draws bring no more.
 
         The cost has a local minimum for each number of impacts, also where the errors are as small as the noise of the velocity.
         """
-        if not any(t.impacts for t in fit.parameters.terms):
+        if not fit.impacts:
             return fit
-        for _ in range(self.policy.deepenings):
-            found = self.evolved(fit)
+        in_vain = 0
+        for draw in range(self.policy.deepenings):
+            found = self.evolved(fit, draw)
             found = min((found, self.refitted(found.hypothesis, found.x, self.policy.long)), key=self.score)
             gained = self.score(fit) - self.score(found)
             fit = found if gained > 0.0 else fit
-            if gained <= self.margin:
+            in_vain = 0 if gained > self.margin else in_vain + 1
+            if in_vain == self.policy.draws_in_vain or (in_vain and self.quiet(fit)):
                 break
         return fit

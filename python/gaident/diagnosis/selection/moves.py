@@ -20,7 +20,7 @@ Whether an effect is added is one decision, `ModelSpace.worth`; a search of the 
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Hashable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -34,14 +34,13 @@ from gaident.diagnosis.selection.mechanisms import (
     balanced_on_a_spring,
     is_mechanism,
     moved_to,
-    on_a_shaft,
     put_on_a_spring,
     released,
-    resonance,
 )
 from gaident.diagnosis.selection.model_space import words
+from gaident.diagnosis.selection.repeated import Repeated
 from gaident.diagnosis.selection.score_test import ScoreTest
-from gaident.diagnosis.selection.side_moves import SideMoves, better_sides
+from gaident.diagnosis.selection.side_moves import better_sides
 from gaident.estimation import least_squares as ls
 from gaident.estimation.criterion import gained
 from gaident.estimation.noise_model import WHITE
@@ -65,7 +64,7 @@ def _nested(hypothesis: Hypothesis, x: NDArray[np.float64], term: Term, simple: 
 
 
 @dataclass(frozen=True, eq=False)
-class Moves(SideMoves):
+class Moves(Repeated):
     """The models over one objective, and the moves between them."""
 
     # Moves that add.
@@ -90,17 +89,17 @@ class Moves(SideMoves):
         if len(now.effects) >= self.policy.most_effects:
             return []
         key = "add", now.key, self.allowed
-        self._grown(now).append(now)
+        self.grown.note(self.objective, self._model(now), now)
         return self.objective.once(key, lambda: self._best(now, [*self.ground(now), *self.with_a_load(now), *self._add(now)]))
 
     def known(self, fit: Fit) -> Fit:
         """A fit of the same model that was grown already, unless it is worse by more than `swap`: what it grows to is known."""
-        near = [f for f in self._grown(fit) if f.bic < fit.bic + self.policy.swap]
+        near = [f for f in self.grown.of(self.objective, self._model(fit)) if f.bic < fit.bic + self.policy.swap]
         return min(near, key=lambda f: f.bic) if near else fit
 
-    def _grown(self, fit: Fit) -> list[Fit]:
-        """The fits of the same model over this objective that were grown."""
-        return self.objective.once(("grown", fit.parameters.kind, frozenset(fit.effects), self.allowed), list)
+    def _model(self, fit: Fit) -> Hashable:
+        """The same for fits of the same model that grow to the same."""
+        return fit.parameters.kind, frozenset(fit.effects), self.allowed
 
     def _add(self, now: Fit) -> list[Fit]:
         self.note(f"looking beyond {words(now.effects) or 'the linear model'}")
@@ -141,6 +140,7 @@ class Moves(SideMoves):
         reach = self.policy.beam_reach * self.penalty
         fits += [self.under_best_predictor(f) if self.score(f) < self.score(best[0]) + reach else f for f in best]
         if fits:
+            fits = self.searched_alike(fits)
             fits += self.as_own_resonance(min(fits, key=self.score))
             fits += self.at_the_load(now, fits)
         return self._best(now, fits)
@@ -268,7 +268,7 @@ class Moves(SideMoves):
         for term in [t for t in hypothesis.parameters.terms if not t.stands_with(hypothesis.effects)]:
             hypothesis, x = _nested(hypothesis, x, term, LIBRARY[term.nested[0]])
         less = self.continued(hypothesis, fit, x)
-        if any(t.impacts for t in less.parameters.terms) and self.data.fits_in_loop and not self.quiet(less):
+        if less.impacts and self.data.fits_in_loop and not self.quiet(less):
             less = min((less, self.evolved(less)), key=lambda f: f.bic)
         return less
 
@@ -331,59 +331,6 @@ class Moves(SideMoves):
             if not nested:
                 return self.score(other) < self.score(fit)
         return not self.worth(fit, other)
-
-    # The same model again.
-
-    def search(self, fit: Fit) -> Fit:
-        """Where more than noise is left: every effect from all of its starts, multimodal ones by a global search nearby.
-
-        Then under the best predictor: the one that a model grew under was chosen beside other values.
-        """
-        for term in fit.parameters.terms[::-1]:
-            if self.quiet(fit):
-                break
-            fit = min((fit, self.restarted(fit, term)), key=lambda f: f.bic)
-            if term.multimodal and not self.quiet(fit):
-                fit = min((fit, self.evolved(fit)), key=lambda f: f.bic)
-        return self.with_best_resonance(self.under_best_predictor(fit) if fit.effects else fit)
-
-    def with_best_resonance(self, fit: Fit) -> Fit:
-        """The fit or, where these score better, two masses with another resonance.
-
-        A fit at the wrong resonance may leave small errors: its noise filter treats the ringing that it misses as noise.
-        """
-        return min((fit, *self.elsewhere(fit)), key=self.score)
-
-    def elsewhere(self, fit: Fit) -> list[Fit]:
-        """Two masses with the same effects, their resonance searched again: that of the fit was found before the effects.
-
-        An extra resonance or an effect of the shaft is left out: it may replace a resonance at the wrong place.
-        """
-        bare, x = fit.hypothesis, fit.x
-        for t in fit.parameters.terms:
-            if t.in_coupling or t.resonates:
-                x, bare = bare.parameters.removed(x, t.name), bare.without(t.name)
-        if fit.parameters.masses == 1 or not bare.parameters.terms or any(t.at_load for t in bare.parameters.terms):
-            return []
-        bare, x = as_one_mass(replace(fit, hypothesis=bare, x=x))
-        one = ls.fit(self.objective, bare, x, WHITE, self.policy.usual)
-        starts = on_a_shaft(self.objective, one, resonance(fit)) if one.cost < WORST else []
-        short = [ls.fit(self.objective, h, x, WHITE, self.policy.short) for h, x in starts]
-        best = min(short, key=lambda f: f.cost, default=None)
-        return [] if best is None else [self.refitted(best.hypothesis, best.x, self.policy.long)]
-
-    def restarted(self, fit: Fit, term: Term) -> Fit:
-        """The best fit from an effect's starts beside the present rest: its first fit began beside other values of the rest."""
-        rows = term.starts(fit.parameters.scales)
-        if not rows:
-            return fit
-        limits = np.array(term.limits(fit.parameters.scales)).T
-        X = np.repeat(fit.x[None, :], len(rows), axis=0)
-        X[:, fit.parameters.slot(term.name)] = np.clip(np.array(rows), *limits)
-        order = np.argsort(self.objective.costs(fit.hypothesis, X, fit.noise))[: self.policy.starts]
-        tries = [ls.scored(self.objective, ls.fit(self.objective, fit.hypothesis, X[i], WHITE, self.policy.usual)) for i in order]
-        best = min(tries, key=lambda f: f.bic)
-        return self.refitted(best.hypothesis, best.x)
 
     def valleys(self, base: Fit) -> list[Fit]:
         """Each multimodal effect alone beside a base, by a global search."""

@@ -42,6 +42,8 @@ def rivals_of(space: Moves, final: Fit, effect: str, equivalent: Collection[str]
         (other,) = new
         if other.name == elsewhere:
             continue
+        if final.impacts and not space.quiet(final):
+            f = space.deepened(f)  # as the model itself was
         behind = f.bic - final.bic
         if other.name in equivalent:
             found.append(Replacement(other.name, behind, f))

@@ -87,11 +87,12 @@ def selected(
     classes: Classes,
     note: Callable[[str], None],
     most: int = POLICY.most_effects,
+    beside: Fit | None = None,
 ) -> Selection:
     """The model of the records, with the rivals of its effects.
 
     objective: over all samples; model: the identified linear one; classes: effect -> what these records cannot tell from it;
-    most: effects at most.
+    most: effects at most; beside: a model that takes the place of the one found where it scores better.
     """
     task = Task(objective, scales, model, tuple(allowed), note, most)
     one = task.one_mass()
@@ -99,15 +100,17 @@ def selected(
     task = task.under(Innovations(floor=noise_floor(task, one)))
     blocks = blocks_of(task.data, error)
     if blocks == 1:
-        return _compared(_decided(task, note), classes, note)
+        return _compared(_or(_decided(task, note), beside), classes, note)
     grid = decimated_objective(task.objective, blocks)
     coarse_scales = replace(scales, dt=task.data.dt * blocks, blocks=blocks)
     outside = tuple(t for t in task.allowed if not t.in_controller)
     outline = _decided(Task(grid, coarse_scales, model, outside, note, most), note)
     found = _on_all_samples(task, outline, note)
     if task.data.fits_in_loop and not (found.space.is_noise(found.final) and found.space.small_unwhitened(found.final)):
-        found = _searched_whole(task, found, note)
-    return _compared(found, classes, note)
+        note("searching all samples, in the loop")
+        # On a coarse grid the controller's torque drives the model, and beside stops and impacts its error grows.
+        found = _or(_decided(task, note), found.final)
+    return _compared(_or(found, beside), classes, note)
 
 
 @dataclass(frozen=True, eq=False)
@@ -300,7 +303,7 @@ def _on_all_samples(task: Task, outline: _Found, note: Callable[[str], None]) ->
     """
     data, family, found = task.data, task.objective.family, outline.space.objective.family
     if outline.final.parameters.masses == 1:  # no stiff shaft, no fine substeps
-        coarse = 0.5 * data.dt  # no decision: the step of a simulation
+        coarse = 0.5 * data.dt  # no decision: of a solver: the step of a simulation
         data = replace(data, finest=max(data.finest, coarse))
     if isinstance(found, Innovations) and found.shaft is not None:
         shaft = ShaftNoise(outline.base.parameters.linear(outline.base.x), data.dt, data.pi)
@@ -325,16 +328,13 @@ def _on_all_samples(task: Task, outline: _Found, note: Callable[[str], None]) ->
     return _Found(space, base, base, test).of(final)
 
 
-def _searched_whole(task: Task, found: _Found, note: Callable[[str], None]) -> _Found:
-    """The search over all samples, in the loop; or the model found on the coarse grid, where that scores better there.
-
-    On a coarse grid the controller's torque drives the model, and beside stops and impacts its error grows.
-    """
-    note("searching all samples, in the loop")
-    whole = _decided(task, note)
-    other = whole.space.refitted(found.final.hypothesis.over(whole.space.data), found.final.x)
-    better = _improved(whole.space, other, whole.final)
-    return whole if better is whole.final else whole.of(better)
+def _or(found: _Found, model: Fit | None) -> _Found:
+    """What a search came to, or another model, fitted to the same data, reduced and grown, where that scores better."""
+    if model is None:
+        return found
+    other = found.space.refitted(model.hypothesis.over(found.space.data), model.x)
+    better = _improved(found.space, other, found.final)
+    return found if better is found.final else found.of(better)
 
 
 def _moved(space: Moves, scales: Scales, fit: Fit) -> Fit:

@@ -62,17 +62,17 @@ EXACT = 1e-3  # no decision: lines, what the parabola of a lag is exact to
 
 
 def searched(
-    objective: Objective, scales: Scales, model: Model, search: Callable[[Objective, int], Selection]
+    objective: Objective, scales: Scales, model: Model, search: Callable[[Objective, int, Fit | None], Selection]
 ) -> tuple[Selection, list[Text]]:
     """What a search selects over records whose velocity is as old as they show, with a note on that.
 
-    search: of these records, with at most so many effects.
+    search: of these records, with at most so many effects; what it ends with is compared with a model that is given.
     """
     most = POLICY.most_effects
     data = objective.data
     controller = data.controller
     if controller is not None and (controller.loop == "continuous" or (any(data.moving) and not data.told_by_torque)):
-        return search(objective, most), []
+        return search(objective, most, None), []
     every = 1 if controller is None else controller.log_every(data.dt)
     if every == 1 and (ahead := _ahead(data, model)) is not None:
         text = (
@@ -83,7 +83,7 @@ def searched(
 
         def under(lines: float) -> Selection:
             near = (-lines - ahead.std, ahead.std - lines)
-            return search(Objective(data.aged(-lines, near), objective.weight, counter=objective.counter), most)
+            return search(Objective(data.aged(-lines, near), objective.weight, counter=objective.counter), most, None)
 
         found = under(ahead.lag)
         closer = _refined(found, ahead)
@@ -98,7 +98,7 @@ def searched(
             "it is no finding."
         )
         older = Objective(data.aged(HALF), objective.weight, counter=objective.counter)
-        return search(older, most), [say(text, 1e3 * HALF * data.dt)]
+        return search(older, most, None), [say(text, 1e3 * HALF * data.dt)]
     # Between the lines of a log whose torque does not follow from its controller, the torque may go on; not where
     # that was given a sample time, and the log has a line for each of its samples.
     going_on = (-HALF,) if every == 1 and controller is not None and data.torque_logged and not data.known_between else ()
@@ -115,16 +115,17 @@ def searched(
             "and nothing speaks against it: they are taken for half a sample old ({:.3g} ms). The simulation has it; it is no "
             "finding."
         )
-        return search(older, most), [say(text, lines, each, age)]
-    found = search(objective, most)
+        return search(older, most, None), [say(text, lines, each, age)]
+    found = search(objective, most, None)
     in_series = any(t.in_series for t in found.final.parameters.terms)
     step = encoder_step(read, data.axis == "linear") if in_series else 0.0
     if not step > 0.0:
         return found, []
     # First whether fewer effects may do, unless the model itself is better so; then what the whole search ends with.
-    limits = (most,) if _better_if_older(found, older) else (len(found.final.effects) - 1, most)
+    closest, better = _over_older(found, older)
+    limits = (most,) if better else (len(found.final.effects) - 1, most)
     for allowed in limits:
-        again = search(older, allowed)
+        again = search(older, allowed, closest if len(closest.effects) <= allowed else None)
         if not _better(again, found):
             return found, []
     return again, [_on_a_lattice(step, age)]
@@ -145,11 +146,13 @@ def _better(again: Selection, found: Selection) -> bool:
     return more <= 0 and _score_beside(again, found) < found.space.score(found.final) - margin
 
 
-def _better_if_older(found: Selection, older: Objective) -> bool:
-    """Whether a model without one of its lags and delays, or with another one there, is better over the older velocities by the
-    margin of two rivals."""
+def _over_older(found: Selection, older: Objective) -> tuple[Fit, bool]:
+    """(the model that was found, fitted to the older velocities; whether it is better there by the margin of two rivals).
+
+    As it is, without one of its lags and delays, or with another one in the place of that, whichever scores best.
+    """
     space, final = found.space, found.final
-    tries = []
+    tries = [final]
     for term in final.parameters.terms:
         if not term.in_series:
             continue
@@ -159,7 +162,9 @@ def _better_if_older(found: Selection, older: Objective) -> bool:
             if other.in_series and other.size == term.size and other.name not in final.effects:
                 longer = short.extended(other)
                 tries.append(replace(final, hypothesis=longer, x=short.parameters.inserted(x, z)))
-    return any(_score_under(older.data, f, space) < space.score(final) - POLICY.rival_margin for f in tries)
+    space = replace(space, objective=replace(space.objective, data=older.data))
+    closest = min((_fitted_to(older.data, f, space) for f in tries), key=space.score)
+    return closest, space.score(closest) < found.space.score(final) - POLICY.rival_margin
 
 
 def _parted(fit: Fit, term: Term) -> tuple[Vector, Vector]:
@@ -219,7 +224,12 @@ def _score_beside(again: Selection, found: Selection) -> float:
 def _score_under(data: DataSet, final: Fit, space: Moves) -> float:
     """Score of a model over these data, fitted again, under the errors of a search."""
     space = replace(space, objective=replace(space.objective, data=data))
-    return space.score(space.refitted(final.hypothesis.over(data), final.x))
+    return space.score(_fitted_to(data, final, space))
+
+
+def _fitted_to(data: DataSet, final: Fit, space: Moves) -> Fit:
+    """A model fitted again to these data, which are those of the space."""
+    return space.refitted(final.hypothesis.over(data), final.x)
 
 
 def _score(objective: Objective, scales: Scales, model: Model) -> float:

@@ -117,6 +117,7 @@ TIME_CONSTANT = _Number(
     "time_constant",
     "s",
     lambda dt, duration: (POLICY.form_fastest * dt, POLICY.form_slowest * duration),
+    # no decision: a start
     lambda dt, duration: np.geomspace(0.5 * dt, 0.1 * POLICY.form_slowest * duration, POLICY.form_starts),
 )
 FREQUENCY = _Number(

@@ -136,7 +136,7 @@ def force_error(
     if isinstance(order, bool) or not isinstance(order, int | np.integer) or not 1 <= order <= 10:
         raise SettingsError(f"order={order!r}: give a whole number from 1 to 10, the filter's order in each direction")
     cutoff = band_of(model, given, int(order)) if cutoff_hz is None else float(cutoff_hz)
-    if not 0.0 < cutoff < 0.5 / given[0].dt:  # no decision: the Nyquist frequency
+    if not 0.0 < cutoff < 0.5 / given[0].dt:  # no decision: a formula: the Nyquist frequency
         raise SettingsError(f"cutoff_hz={cutoff_hz!r}: give a corner between 0 and {0.5 / given[0].dt:g} Hz, or None")
     filtered = FilteredRecords(tuple(given), tuple(firsts), cutoff, int(order))
     return filtered.force_error(model, filtered.torques(model))

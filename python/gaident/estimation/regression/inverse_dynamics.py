@@ -104,7 +104,7 @@ def inverse_dynamics(
     # no decision: what an argument may be
     if isinstance(order, bool) or not isinstance(order, int | np.integer) or not 1 <= order <= 10:
         raise SettingsError(f"order={order!r}: give a whole number from 1 to 10, the filter's order in each direction")
-    nyquist = 0.5 / records[0].dt  # no decision: the Nyquist frequency
+    nyquist = 0.5 / records[0].dt  # no decision: a formula: the Nyquist frequency
     cutoff = (
         min(cutoff_of(r, order) for r in records) if cutoff_hz is None else _number(cutoff_hz, "cutoff_hz", "the corner in Hz")
     )
@@ -275,7 +275,8 @@ def _rivals(scores: dict[tuple[str, ...], float], chosen: tuple[str, ...]) -> tu
 def _effective(lefts: dict[tuple[str, ...], list[Vector]], fits: dict[tuple[str, ...], tuple[Vector, int]]) -> float:
     """Independent samples of the residuals of the choice that leaves least, at least two for each column."""
     best = min(lefts, key=lambda c: sum(float(x @ x) for x in lefts[c]))
-    return max(effective_samples(*lefts[best]), 2.0 * len(fits[best][0]))  # no decision: no fewer than the fit has numbers twice
+    # no decision: a formula: no fewer than the fit has numbers twice
+    return max(effective_samples(*lefts[best]), 2.0 * len(fits[best][0]))
 
 
 def _relative(left: Sequence[Vector], rows: Sequence[Rows]) -> float:

@@ -75,9 +75,10 @@ def _beside(still: NDArray[np.bool_], width: int) -> NDArray[np.bool_]:
 def low_passed(x: Vector, dt: float, cutoff_hz: float, order: int) -> Vector:
     """x behind the Butterworth filter run forward and backward; a straight line between its ends passes as it is."""
     line = x[0] + (x[-1] - x[0]) / (x.size - 1) * np.arange(x.size)
-    # no decision: samples beyond the ends, for a filter to settle
+    # no decision: a formula: a filter settles beyond the ends
     extension = min(max(15, math.ceil(2.0 / (cutoff_hz * dt))), x.size - 1)
-    return np.asarray(zero_phase(_sections(order, cutoff_hz * 2.0 * dt), (x - line)[None, :], extension)[0] + line)
+    low_pass = _sections(order, cutoff_hz * 2.0 * dt)  # no decision: a formula
+    return np.asarray(zero_phase(low_pass, (x - line)[None, :], extension)[0] + line)
 
 
 @lru_cache(maxsize=64)
@@ -124,7 +125,7 @@ def torque_noise(rec: Record, cutoff_hz: float, order: int) -> float:
 
 def _twice(rec: Record, f: Vector, cutoff_hz: float, order: int) -> Vector:
     """Gain of the filter, run forward and backward, at frequencies f [Hz]."""
-    # no decision: next to the Nyquist frequency
+    # no decision: a formula: next to the Nyquist frequency
     warped = np.tan(np.pi * np.minimum(f, 0.499 / rec.dt) * rec.dt) / math.tan(math.pi * cutoff_hz * rec.dt)
     return np.asarray(1.0 / (1.0 + warped ** (2 * order)))
 
@@ -143,7 +144,7 @@ def _spectrum(rec: Record) -> Spectrum:
 
     x = rec.velocity if rec.position is None else rec.position
     line = x[0] + (x[-1] - x[0]) / (x.size - 1) * np.arange(x.size)
-    f, power = welch(x - line, 1.0 / rec.dt, nperseg=min(x.size, 2048))  # no decision: the resolution of a spectrum
+    f, power = welch(x - line, 1.0 / rec.dt, nperseg=min(x.size, 2048))  # no decision: a grid: the lines of a spectrum
     high = (f >= POLICY.noise_from / rec.dt) & (f <= POLICY.noise_to / rec.dt)
     return f, power, float(np.median(power[high])) if np.any(high) else 0.0
 

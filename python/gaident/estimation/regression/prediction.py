@@ -41,7 +41,7 @@ def regression_error(found: InverseDynamics, records: Sequence[Record]) -> float
 
 
 def _fits(found: InverseDynamics, record: Record) -> None:
-    if not found.cutoff_hz < 0.5 / record.dt:  # no decision: the Nyquist frequency
+    if not found.cutoff_hz < 0.5 / record.dt:  # no decision: a formula: the Nyquist frequency
         raise SettingsError(
             f"the record has dt={record.dt:g} s, too slow for the filter of {found.cutoff_hz:g} Hz that was used; "
             f"fit with cutoff_hz below {0.5 / record.dt:g}"

@@ -127,7 +127,7 @@ def torque_held_at_rest(records: Sequence[Record], cutoff_hz: float | None = Non
         for first, last in zip(edges[::2] + margin, edges[1::2] - margin, strict=True):
             if last - first < 2 * margin:
                 continue
-            level = 0.5 * float(np.ptp(motion.torque[first:last]))  # no decision: H is half the range
+            level = 0.5 * float(np.ptp(motion.torque[first:last]))  # no decision: a formula: H is half the range
             if best is None or level > best.value:
                 best = Estimate(level, torque_noise(rec, cutoff, ORDER), "N m")
     return best

@@ -81,10 +81,10 @@ def torque_lag(rec: Record, cutoff_hz: float | None = None) -> TorqueLag | None:
     if best in (0, len(left) - 1) or left[best] > POLICY.lag_left:
         return None
     before, least, after = left[best - 1 : best + 2]
-    curvature = 0.5 * (before + after) - least  # no decision: a parabola through three values
+    curvature = 0.5 * (before + after) - least  # no decision: a formula: a parabola through three values
     if not curvature > 0.0:
         return None
-    within = 0.25 * (before - after) / curvature  # no decision: a parabola through three values
+    within = 0.25 * (before - after) / curvature  # no decision: a formula: a parabola through three values
     lowest = max(least - curvature * within**2, 0.0)
     std = float(np.sqrt(lowest / (effective_samples(residuals[best][::factor]) * curvature)))
     return TorqueLag(steps[best] + within, std, lowest) if std < POLICY.lag_std else None

@@ -107,7 +107,7 @@ def estimate_winding(
         raise RecordError(f"voltage, current and velocity have {len(U)}, {len(i)} and {len(w)} samples: give the same of each")
     rec = Record(dt, velocity=w, torque=i)
     cutoff = cutoff_of(rec, ORDER) if cutoff_hz is None else float(cutoff_hz)
-    if not 0.0 < cutoff < 0.5 / rec.dt:  # no decision: the Nyquist frequency
+    if not 0.0 < cutoff < 0.5 / rec.dt:  # no decision: a formula: the Nyquist frequency
         raise RecordError(f"cutoff_hz={cutoff_hz!r}: give a corner between 0 and {0.5 / rec.dt:g} Hz, or None")
     factor = decimation_of(None, cutoff, rec.dt)
     held = 0.5 * (U + np.concatenate([U[:1], U[:-1]]))

@@ -105,7 +105,7 @@ def control_error(torque: Vector, controller: PI, dt: float) -> Vector | None:
 
     Both are 0 before the record. None where a limit hides it, or where the recursion is unstable.
     """
-    kp, h = controller.kp, 0.5 * controller.ki * dt  # no decision: the trapezoidal rule
+    kp, h = controller.kp, 0.5 * controller.ki * dt  # no decision: a formula: the trapezoidal rule
     if kp <= h or controller.limited:
         return None
     rise = np.array([1.0, -1.0]) / (kp + h)

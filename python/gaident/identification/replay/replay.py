@@ -129,7 +129,7 @@ def _compared(rec: Record, command: Vector, controller: Controller, logged: Vect
             break
     if found is not None and found.cause == "initial_integral":
         return Replay(*figures, True, found.cause, found.value, None, say("{}, {}", head, found.sentence))
-    departs = int(np.argmax(np.abs(off) > min(allowed.torque, maximum / 2)))  # no decision: half of the highest
+    departs = int(np.argmax(np.abs(off) > min(allowed.torque, maximum / 2)))  # no decision: printed: where it departs
     head = say(
         "The logged {torque} does not follow from command and velocity through this controller: it departs first at sample "
         "{} ({:.4g} s), by {:.2g} {N m} rms and {:.2g} {N m} at most",

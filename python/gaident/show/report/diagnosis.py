@@ -128,7 +128,7 @@ def tiles(dia: Diagnosis, view: View) -> Html:
         low, high = dia.gain_interval
         interval = typeset(f"95 % interval of the fall: {percent(low)} to {percent(high)} %") if math.isfinite(low) else ""
         fall = 1.0 - dia.after.rmse / dia.before.rmse
-        worse = fall < -0.005  # no decision: what is printed as 0 %
+        worse = fall < -0.005  # no decision: printed: as 0 %
         label = "worse in free run: the error grows by" if worse else "the error falls by"
         shown.append(tile(label, typeset(f"{percent(abs(fall))} %"), interval))
     return joined(shown)
@@ -225,7 +225,8 @@ def _parameters(dia: Diagnosis, view: View, drawn: Charts) -> Section:
         if dia.model.effects:
             parts.append(table(("", "value", "unit", "linear fit alone", "moved", ""), [rows]))
         else:
-            parts.append(table(("", "value", "unit", ""), [[(*r[:3], r[5]) for r in rows]]))  # no decision: columns of a table
+            # no decision: printed: columns of a table
+            parts.append(table(("", "value", "unit", ""), [[(*r[:3], r[5]) for r in rows]]))
         parts.append(tag("p", tag("small", f"± {SPREAD} The colour of the noise is taken into account.")))
     if any(not f.is_noise for f in dia.findings):
         parts.append(tag("p", "The parameters of the effects stand with their cause above."))

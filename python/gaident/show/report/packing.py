@@ -26,7 +26,7 @@ FILTER = {
     **{"lc": 3, "lp": 0, "pb": 0},  # unpack.js knows these alone
 }
 """How Python's lzma packs: contexts of three bits of the byte before, none of the place."""
-BITS, LETTERS = 13, 91  # no decision: of a pair of letters
+BITS, LETTERS = 13, 91  # no decision: a format: a pair of letters
 FIRST, LEFT_OUT = ord("#"), ord("<")  # the letters are # to ~ without <, which may end a script
 
 

@@ -1,0 +1,81 @@
+"""The same model again: from all starts and globally, with another resonance, under the predictor that shows most."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from gaident.diagnosis.selection.mechanisms import as_one_mass, on_a_shaft, resonance
+from gaident.diagnosis.selection.side_moves import SideMoves
+from gaident.estimation import least_squares as ls
+from gaident.estimation.noise_model import WHITE
+from gaident.estimation.objective import Fit
+from gaident.estimation.projection import WORST
+from gaident.estimation.term import Term
+
+__all__ = ["Repeated"]
+
+
+@dataclass(frozen=True, eq=False)
+class Repeated(SideMoves):
+    """The models over one objective, and the moves that keep a model and look for other numbers."""
+
+    def search(self, fit: Fit) -> Fit:
+        """Where more than noise is left: every effect from all of its starts, multimodal ones by a global search nearby.
+
+        Then under the best predictor: the one that a model grew under was chosen beside other values.
+        """
+        for term in fit.parameters.terms[::-1]:
+            if self.quiet(fit):
+                break
+            fit = min((fit, self.restarted(fit, term)), key=lambda f: f.bic)
+            if term.multimodal and not self.quiet(fit):
+                fit = min((fit, self.evolved(fit)), key=lambda f: f.bic)
+        return self.with_best_resonance(self.under_best_predictor(fit) if fit.effects else fit)
+
+    def with_best_resonance(self, fit: Fit) -> Fit:
+        """The fit or, where these score better, two masses with another resonance.
+
+        A fit at the wrong resonance may leave small errors: its noise filter treats the ringing that it misses as noise.
+        """
+        return min((fit, *self.elsewhere(fit)), key=self.score)
+
+    def elsewhere(self, fit: Fit) -> list[Fit]:
+        """Two masses with the same effects, their resonance searched again: that of the fit was found before the effects.
+
+        An extra resonance or an effect of the shaft is left out: it may replace a resonance at the wrong place.
+        """
+        bare, x = fit.hypothesis, fit.x
+        for t in fit.parameters.terms:
+            if t.in_coupling or t.resonates:
+                x, bare = bare.parameters.removed(x, t.name), bare.without(t.name)
+        if fit.parameters.masses == 1 or not bare.parameters.terms or any(t.at_load for t in bare.parameters.terms):
+            return []
+        bare, x = as_one_mass(replace(fit, hypothesis=bare, x=x))
+        one = ls.fit(self.objective, bare, x, WHITE, self.policy.usual)
+        starts = on_a_shaft(self.objective, one, resonance(fit)) if one.cost < WORST else []
+        short = [ls.fit(self.objective, h, x, WHITE, self.policy.short) for h, x in starts]
+        best = min(short, key=lambda f: f.cost, default=None)
+        return [] if best is None else [self.refitted(best.hypothesis, best.x, self.policy.long)]
+
+    def restarted(self, fit: Fit, term: Term) -> Fit:
+        """The best fit from an effect's starts beside the present rest: its first fit began beside other values of the rest."""
+        rows = term.starts(fit.parameters.scales)
+        if not rows:
+            return fit
+        limits = np.array(term.limits(fit.parameters.scales)).T
+        X = np.repeat(fit.x[None, :], len(rows), axis=0)
+        X[:, fit.parameters.slot(term.name)] = np.clip(np.array(rows), *limits)
+        order = np.argsort(self.objective.costs(fit.hypothesis, X, fit.noise))[: self.policy.starts]
+        tries = [ls.scored(self.objective, ls.fit(self.objective, fit.hypothesis, X[i], WHITE, self.policy.usual)) for i in order]
+        best = min(tries, key=lambda f: f.bic)
+        return self.refitted(best.hypothesis, best.x)
+
+    def searched_alike(self, fits: Sequence[Fit]) -> list[Fit]:
+        """Models, of which all with impacts are searched where one of these leads: a local fit does not tell which is better."""
+        lead = min(fits, key=self.score)
+        if not lead.impacts or self.quiet(lead):
+            return list(fits)
+        return [self.search(f) if f.impacts else f for f in fits]
