@@ -144,6 +144,8 @@ def add_log_options(parser: argparse.ArgumentParser) -> None:
     _add_text_options(g)
     pitch = "of a linear axis, the length with which its cogging returns [m], or '10 mm': pitch of the screw or of the poles"
     g.add_argument("--pitch", type=length, metavar="M", help=pitch)
+    screw = "of a motor on a screw, the length of a turn [m], or '10 mm': mm, mm/min and N of the log are then those of the motor"
+    g.add_argument("--screw", type=length, metavar="M", help=screw)
     g.add_argument("--axis", choices=AXES, help="linear: print m, m/s, N, kg (default: rotary)")
 
 

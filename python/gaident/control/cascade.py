@@ -253,6 +253,11 @@ class Cascade(Controller):
         velocity = with_own(self.velocity, "velocity.", numbers)
         return replace(with_own(self, "", numbers), velocity=velocity, position=position, **filters)
 
+    @property
+    def clock(self) -> float | None:
+        """See `Controller`: its period."""
+        return self.period
+
     def ahead(self, dt: float) -> int:
         """See `Controller`."""
         return 1 if self.position is None else -(-2 * self.position_every(dt) // self.log_every(dt))

@@ -114,6 +114,11 @@ class Controller(ABC):
         return any(map(math.isfinite, self.limits))
 
     @property
+    def clock(self) -> float | None:
+        """Its sample time [s] as it was given; None: that of the log, as far as anyone knows."""
+        return None
+
+    @property
     def delay(self) -> float:
         """Time from a sample to its torque at the motor [s]."""
         return 0.0

@@ -88,6 +88,7 @@ def read(
     resistance: float | None = None,
     inductance: float | None = None,
     back_emf_constant: float | None = None,
+    screw: float | None = None,
     velocity_cutoff_hz: float | None = None,
     decimate: int = 1,
     resample: float | None = None,
@@ -138,6 +139,8 @@ def read(
     resistance, inductance, back_emf_constant : float, optional
         Of the motor's winding [Ohm], [H], [V s/rad]: a voltage becomes the torque kt (U - ke w)/R, see `Winding`; None: L = 0,
         ke = kt. Of voltage and current without a `torque_constant` the winding is estimated, and a note says so.
+    screw : float, optional
+        Length that a turn of the motor moves [m]: what is logged in mm, mm/min or N becomes angle, speed and torque of the motor.
     velocity_cutoff_hz : float, optional
         Corner [Hz].
         The velocity of a log that has a position and none is the difference of the position;
@@ -209,6 +212,7 @@ def read(
         resistance=resistance,
         inductance=inductance,
         back_emf_constant=back_emf_constant,
+        screw=screw,
         velocity_cutoff_hz=velocity_cutoff_hz,
         decimate=decimate,
         resample=resample,

@@ -15,8 +15,17 @@ from gaident.data.record import Record
 from gaident.diagnosis.controller.as_read import in_terms_of_the_log, outliers_of_the_log
 from gaident.diagnosis.controller.driving import Driving, driving_of
 from gaident.diagnosis.controller.form_findings import loop_of
+from gaident.diagnosis.explain.expected import outside_of
 from gaident.diagnosis.note import Note
-from gaident.diagnosis.records.arguments import ProgressCallback, accuracy_of, checked, in_order, noise_std_of, records_of
+from gaident.diagnosis.records.arguments import (
+    ProgressCallback,
+    accuracy_of,
+    checked,
+    expected_of,
+    in_order,
+    noise_std_of,
+    records_of,
+)
 from gaident.diagnosis.work import Work
 from gaident.errors import SettingsError
 from gaident.identification.identify import identify
@@ -51,6 +60,7 @@ def diagnose(
     pitch: float | None = None,
     accuracy: float | Mapping[str, float] | None = None,
     quick: bool = False,
+    expected: Mapping[str, tuple[float, float]] | None = None,
 ) -> Diagnosis:
     """Show what the model of an axis gets wrong, name the physical cause where the data allow it, and measure the gain.
 
@@ -88,6 +98,9 @@ def diagnose(
     quick : bool
         Stop at the first cause: the search takes one effect at most, or the fewest with which a cause is named.
         What else is there is left, and a note says so.
+    expected : mapping, optional
+        Ranges of the whole mechanism as you know it: "inertia" [kg m^2], "resonance_hz" [Hz], "damping" [N m s/rad].
+        They bound no search; a note says what was found outside.
 
     Returns
     -------
@@ -130,13 +143,15 @@ def diagnose(
     checked(records, validating, driven.loop, identification, bootstrap, seed, progress, axis, pitch)
     origin = {r.digest: whole for r, whole in zip((*records, *validating), (*given, *kept), strict=True)}
     records, validating = in_order(records), in_order(validating)
-    noise_std, asked_accuracy = noise_std_of(noise), accuracy_of(accuracy)
+    noise_std, asked_accuracy, ranges = noise_std_of(noise), accuracy_of(accuracy), expected_of(expected)
     if not isinstance(quick, bool):
         raise SettingsError(f"quick is {quick!r}: give True or False")
     with threadpool_limits(1, user_api="blas"), np.errstate(over="ignore", invalid="ignore"):
         note(0.01, "replaying the controller, and looking for its form where it does not fit")
         driving = driving_of(records, validating, asked, driven, origin)
-        driving = replace(driving, outliers={r.digest: hit for r, hit in zip(given, lines, strict=True)})
+        hit = {r.digest: outliers for r, outliers in zip(given, lines, strict=True)}
+        clocked = controller is not None and controller.clock is not None
+        driving = replace(driving, outliers=hit, clocked=clocked, left_open=controller is not None and bool(controller.unknown))
         note(0.02, "identifying the linear model")
 
         def searched(driving: Driving, most: int, idn: Identification | None = None) -> Work:
@@ -191,8 +206,7 @@ def diagnose(
             velocity, torque = (asked_accuracy.get(name) for name in ("velocity", "torque"))
             wanted = replace(result.relevance, velocity_accuracy=velocity, torque_accuracy=torque)
             result = replace(result, relevance=wanted)
-        if quick:
-            result = replace(result, notes=(*result.notes, FIRST_CAUSE))
+        result = replace(result, notes=(*result.notes, *outside_of(ranges, result.mechanics), *((FIRST_CAUSE,) * quick)))
         if identification is not None and work.idn is not identification:
             result = replace(result, notes=(IDENTIFIED_AGAIN, *result.notes))
         answered = work.at_controller.decided or any(f.place == "controller" for f in result.findings)

@@ -16,12 +16,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gaident.estimation.objective import Fit, Objective
-from gaident.estimation.uncertainty import controller_part, covariance_of
+from gaident.estimation.uncertainty import age_part, controller_part, covariance_of
 from gaident.models.two_mass import mechanics_with_shaft_damping
 from gaident.policy.table import POLICY
 from gaident.results.estimate import Estimate
 
-__all__ = ["MECHANICS", "base_shift", "mechanics_of", "moved", "negative_damping", "slopes_of"]
+__all__ = ["MECHANICS", "base_shift", "mechanics_of", "moved", "negative_damping", "of_the_age", "slopes_of"]
 
 Vector = NDArray[np.float64]
 
@@ -62,6 +62,14 @@ def mechanics_of(objective: Objective, fit: Fit) -> dict[str, Estimate]:
         for name, value, s, part in zip(MECHANICS, found, std, np.sqrt(parts), strict=False)
         if np.isfinite(value)
     }
+
+
+def of_the_age(objective: Objective, fit: Fit) -> dict[str, float]:
+    """Name -> the part of its standard deviation that the age of the velocity brings in, where the records do not show it."""
+    base = slice(fit.parameters.base)
+    _, slopes = _with_slopes(fit)
+    part = np.sqrt(np.maximum(np.einsum("ij,ik,kj->j", slopes, age_part(objective, fit)[base, base], slopes), 0.0))
+    return {name: float(value) for name, value in zip(MECHANICS, part, strict=False)}
 
 
 def slopes_of(fit: Fit) -> dict[str, Vector]:

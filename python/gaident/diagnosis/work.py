@@ -24,6 +24,7 @@ from gaident.diagnosis.explain.determined import determined, not_determined
 from gaident.diagnosis.explain.held_out import standing
 from gaident.diagnosis.explain.verdict import verdict_of
 from gaident.diagnosis.explain.wording import (
+    ON_A_SPRING,
     basis_of,
     closer_numbers,
     closest,
@@ -43,7 +44,7 @@ from gaident.diagnosis.library.record import findings_of_the_record
 from gaident.diagnosis.library.sides import called_of, name_of, sides_of
 from gaident.diagnosis.library.terms import LIBRARY, in_controller
 from gaident.diagnosis.linear_part import linear_of_part
-from gaident.diagnosis.mechanics import base_shift, mechanics_of, negative_damping
+from gaident.diagnosis.mechanics import base_shift, mechanics_of, negative_damping, of_the_age
 from gaident.diagnosis.note import Note
 from gaident.diagnosis.records.folded import ADVICE, folded
 from gaident.diagnosis.records.hygiene import cleaned, left_out, quantisation, unexplained
@@ -100,7 +101,7 @@ class Work:
         whole = self.driving.read
         read = as_read(whole, [cleaned(r, h) for r, h in zip(whole, others, strict=True)], self.controller)
         data = DataSet.of(clean, self.controller, any(len(h) for h in others), read, self.step, self.axis, self.pitch)
-        data = data.with_its_period()
+        data = replace(data.with_its_period(), clocked=self.driving.clocked)
         self.notes += period_seen(data)
         self.scales = scales_of(data)
         self.controller_steps, self.at_controller, notes = controller_findings(data, self.scales)
@@ -226,7 +227,6 @@ class Work:
         """The effects that stand, and their gains. Where none stands, those of the search by whitened errors are judged."""
         while True:
             said = list(self.notes)
-            self.notes += basis_of(self.found)
             gains = self._accepted_gains()
             driver = self.left.driver if self.adequate else self.left.strongest
             adds_up = self.data.slower and not self.data.fits_in_loop  # what the torque lacks between the lines of the log
@@ -250,6 +250,7 @@ class Work:
             if why or check.loses:
                 driver = driver or self.left.strongest or "time"
                 self.notes += why
+            self.notes += basis_of(self.found, driver is not None)
             instead = None if causes else by_whitened_errors(self.found, self._equivalent_here, self._say)
             if instead is None:
                 self.notes += gains.notes
@@ -292,11 +293,10 @@ class Work:
         if driver is not None and (dropped := [e for e in self.final.effects if e not in causes]):
             shown = driver if self.left.gains[driver] > self.left.needed else None
             self.notes.append(closest(dropped, shown, bool(real)))
-        self.notes += (*of_the_mechanics(mechanics), *check.notes)
+        ages = of_the_age(self.under, self.estimate)
+        self.notes += (*of_the_mechanics(mechanics, ages, self.data, self.driving.left_open), *check.notes)
         if self.final.parameters.on_a_spring and any(LIBRARY[e].constant for e in self.final.effects):
-            self.notes.append(
-                Text("The axis is on a spring to the ground: its tension where the record starts is part of the constant load.")
-            )
+            self.notes.append(ON_A_SPRING)
         ambiguous = [f for f in real if f.alternatives]
         proposal = None
         if ambiguous:

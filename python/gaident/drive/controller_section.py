@@ -75,7 +75,7 @@ def controller_of(given: Values, general: Values) -> Controller:
 
 def _in_si(given: Values, general: Values) -> dict[str, Any]:
     """The values with units taken off, filters made, and ki of the integral time; what is not known is None."""
-    constants = {**general, INERTIA: si_number(given[INERTIA], INERTIA, {}) if INERTIA in given else None}
+    constants = {**general, INERTIA: si_number(given[INERTIA], INERTIA, general) if INERTIA in given else None}
     values: dict[str, Any] = {
         key: tuple(map(_filter, value))
         if key in FILTERS

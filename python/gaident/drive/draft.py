@@ -169,6 +169,7 @@ class _Draft:
         ]
         if self.axis == "linear":
             lines.append(line_of('# pitch = "24 mm"', "with which a cogging returns: pitch of the screw, or of the poles"))
+            lines.append(line_of('# screw = "10 mm"', 'of a turn of the motor, for gains in N m s/rad: then axis = "rotary"'))
         for name in dict.fromkeys(needed_constant(channel, stated) for channel, stated in self.units.items() if stated):
             if name is not None:
                 value, meaning = _CONSTANTS[name]
@@ -318,18 +319,22 @@ class _Draft:
             gain = line_of(place, "1/s; without it the velocity command drives the loop")
         return [
             mark("# kp = 0.0232", "controller.kp", f"{unit('N m s/rad', self.axis)}; proportional gain {text}"),
-            mark("# ki = 1.367", "controller.ki", f"{unit('N m/rad', self.axis)}; integral gain"),
+            mark(
+                "# ki = 1.367",
+                "controller.ki",
+                f'{unit("N m/rad", self.axis)}; integral gain, or in its place tn = "17 ms", its time',
+            ),
+            line_of('# period = "125 us"', "of a controller that is faster than the log; also delay, torque_filters, ..."),
+            line_of('# rule = "backward"', 'of the integral, or "forward"; left out: "trapezoidal"'),
+            line_of("# torque_limit = 2.4", "a known limit of the controller, and integrator_limit"),
             *(
                 [gain, line_of('# velocity_feedforward = "100 %"', "also acceleration_feedforward, position_period")]
                 if positioned
                 else []
             ),
             line_of('# loop = "sampled"', f'a digital drive; or "continuous"; or "open": the {torque} drives the model'),
-            line_of('# rule = "backward"', 'of the integral, or "forward"; left out: "trapezoidal"'),
-            line_of("# torque_limit = 2.4", "a known limit of the controller, and integrator_limit"),
             line_of('# anti_windup = "hold"', 'at a torque_limit; or "tracking" with tracking_time'),
             line_of('# drive = "sinamics"', "with p1460 and p1462 in place of kp and ki: gains as the drive shows them"),
-            line_of("# period = 125e-6", "s, of a controller that is faster than the log; also delay, torque_filters, ..."),
         ]
 
     def _space(self) -> list[str]:

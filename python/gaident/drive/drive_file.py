@@ -42,6 +42,7 @@ KEYS: dict[str, dict[str, kinds.Check]] = {
         "dt": kinds.number,
         "velocity_cutoff_hz": kinds.number,
         **dict.fromkeys(CONSTANTS, kinds.number),
+        "screw": kinds.length,
         "gear_ratio": kinds.positive,
         "load_side": kinds.channels,
         "torque_is": kinds.torque_is,
@@ -119,6 +120,10 @@ class Drive:
         """
         if not measured and _is_proposal(path) and not {"command", "command [rad/s]", "command [m/s]"} & {*self.columns.values()}:
             return [read(path, measured=False)]
+        if "screw" in self.general and self.axis == "linear":
+            raise SettingsError(
+                'screw makes a rotary axis of one that is logged in mm, and axis is "linear": leave the one or the other out'
+            )
         columns = {k: None if v == "" else v for k, v in self.columns.items()}
         left_out = {k for k, v in columns.items() if v is None}
         not_read = {"axis", "pitch", "dt", "from", "to", "pieces"} | ({"torque_is"} if "torque" in left_out else set())
@@ -168,6 +173,11 @@ class Drive:
                 "what the axis may do in an experiment"
             )
         return Limits(**self.limit_values)
+
+    @property
+    def expected(self) -> dict[str, tuple[float, float]]:
+        """The ranges of the mechanism that the drive file knows."""
+        return {name: self.space_values[name] for name in ("inertia", "resonance_hz", "damping") if name in self.space_values}
 
     def space(self, records: Sequence[Record], controller: Controller | None) -> SearchSpace | None:
         """The search space: what is given, the rest derived from the data; None where nothing is given."""

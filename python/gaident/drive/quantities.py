@@ -31,6 +31,7 @@ _FORCES: dict[str, Factor] = {"N": (1.0, ""), **_CURRENTS, **_SHARES_OF_RATED}
 _TIMES: dict[str, Factor] = {"s": (1.0, ""), "ms": (1e-3, ""), "us": (1e-6, "")}
 _SHARES: dict[str, Factor] = {"1": (1.0, ""), "%": (1e-2, "")}
 _PER_SPEED = {" s/rad": 1.0, "/rpm": 1.0 / _RPM, "/(rad/s)": 1.0, "/(1/min)": 1.0 / _RPM}
+_PER_ANGLE = {"/rad": 1.0, "/(rad/s s)": 1.0, "/(rpm s)": 1.0 / _RPM}
 _PER_LINEAR_SPEED = {" s/m": 1.0, "/(m/s)": 1.0}
 
 
@@ -45,7 +46,7 @@ _UNITS: dict[str, dict[str, Factor]] = {
         **_per(_FORCES, _PER_LINEAR_SPEED),
         **{"1/s": (1.0, INERTIA), "rad/s": (1.0, INERTIA), "Hz": (math.tau, INERTIA)},
     },
-    "ki": {**_per(_TORQUES, {"/rad": 1.0, "/(rad/s s)": 1.0, "/(rpm s)": 1.0 / _RPM}), **_per(_FORCES, {"/m": 1.0})},
+    "ki": {**_per(_TORQUES, _PER_ANGLE), **_per(_FORCES, {"/m": 1.0})},
     INTEGRAL_TIME: _TIMES,
     "command_weight": _SHARES,
     **{key: {**_TORQUES, **_FORCES} for key in ("torque_limit", "integrator_limit", "friction_feedforward")},
@@ -59,6 +60,11 @@ _UNITS: dict[str, dict[str, Factor]] = {
     "frequency": {"Hz": (1.0, ""), "rad/s": (1.0 / math.tau, "")},
     INERTIA: {"kg m^2": (1.0, ""), "kg cm^2": (1e-4, ""), "kg": (1.0, "")},
 }
+_OF_ONE_AXIS: dict[str, tuple[str, ...]] = {
+    "rotary": ("N m", "mN m", "kg m^2", "kg cm^2", *_per(_TORQUES, _PER_SPEED), *_per(_TORQUES, _PER_ANGLE)),
+    "linear": ("N", "kg", *_per(_FORCES, _PER_LINEAR_SPEED), *_per(_FORCES, {"/m": 1.0})),
+}
+"""Units that only gains, torques and inertias of such an axis have."""
 _MAY_BE_UNKNOWN = frozenset({*UNITS, "position_gain"} - {"gain"})
 _NUMBER = re.compile(r"([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(.*)")
 
@@ -80,11 +86,26 @@ def si_number(value: Any, name: str, constants: Mapping[str, Any]) -> float | No
     if _checked(value, name, ControllerError).strip() == UNKNOWN:
         return None
     number, unit = _parts(value)
+    _refuse_other_axis(value, name, unit, str(constants.get("axis", "rotary")))
     size, constant = _units(name)[_spelling(unit)]
     if constant and constants.get(constant) is None:
         where = "in [controller]" if constant == INERTIA else "above the first section"
         raise ControllerError(f"{name} is {value!r}, which needs {constant}: give it {where}")
     return number * size * (float(constants[constant]) if constant else 1.0)
+
+
+def _refuse_other_axis(value: str, name: str, unit: str, axis: str) -> None:
+    """Raises ControllerError for a unit that gains, torques and inertias of the other kind of axis have."""
+    other = {"rotary": "linear", "linear": "rotary"}[axis]
+    if _spelling(unit) not in map(_spelling, _OF_ONE_AXIS[other]):
+        return
+    own = [u for u in _UNITS[name] if u in _OF_ONE_AXIS[axis]]
+    screw = (
+        'or, of a motor on a screw, axis = "rotary" and screw = "10 mm", which makes angles of the motor of what is logged in mm'
+        if axis == "linear"
+        else 'or axis = "linear" where the log is in m, m/s and N'
+    )
+    raise ControllerError(f'{name} is {value!r}, a unit of a {other} axis, and axis is "{axis}": give it in {own[0]}, {screw}')
 
 
 def _checked(value: str, name: str, error: type[GaidentError]) -> str:

@@ -16,18 +16,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gaident.axis import TURN, period_of
-from gaident.control.controller import Controller, Limiting
+from gaident.control.controller import Controller
 from gaident.control.differencing import differencing
-from gaident.control.filtering import filtered, rate_limited
+from gaident.control.filtering import filtered
 from gaident.control.found import FoundNumbers
 from gaident.control.pi import PI, bare_pi
 from gaident.data.record import Record
 from gaident.data.torque_kind import MEASURED
 from gaident.estimation.mean_velocity import means, with_middles
 from gaident.estimation.period import period_of_place
-from gaident.estimation.term import Term
+from gaident.estimation.term import Term, limiting_of
 from gaident.models.drive_torque import late, torque_of
 from gaident.models.simulate_many import LoadedRecord
+from gaident.models.simulation_input import followed
 from gaident.models.starts import noise_std, starts_moving
 from gaident.models.stored_torque import stored_torque
 from gaident.policy.table import POLICY
@@ -56,6 +57,7 @@ class DataSet:
     A torque that drives a model is delayed by the age. In a simulated loop the velocity is that difference.
     other_ages: ages that are possible too; a model that does not exclude them is less certain by what they change.
     found: numbers of the controller that the records show; their uncertainty is part of every deviation.
+    clocked: whether the sample time of the controller was given.
     """
 
     records: tuple[Record, ...]
@@ -77,6 +79,7 @@ class DataSet:
     age: float = 0.0
     other_ages: tuple[float, ...] = ()
     found: FoundNumbers | None = None
+    clocked: bool = False
 
     @classmethod
     def of(
@@ -250,6 +253,14 @@ class DataSet:
         """Whether the log has fewer lines than the controller samples: the torque is then known on the lines only."""
         return self.controller is not None and self.controller.log_every(self.dt) > 1
 
+    @property
+    def known_between(self) -> bool:
+        """Whether it is known which torque drives the motor between the lines of the log.
+
+        It follows from the controller, or the log has a line for each of the samples that the controller was given.
+        """
+        return self.loop_follows or (self.clocked and not self.slower)
+
     def loaded(self, records: Sequence[Record], controller: Controller | None) -> tuple[LoadedRecord, ...]:
         """Records as the core takes them, in this loop; those of the data set itself are loaded once.
 
@@ -343,8 +354,8 @@ class DataSet:
         """The same with records and controller as effects at the controller, which are known, make them in the simulated loop."""
         if not effects or self.pi is None:
             return self
-        also, torque = _limiting(effects), self.pi.torque_limit
-        records, turned = (tuple(_followed(r, also.slope) for r in part) for part in (self.records, self.turned))
+        also, torque = limiting_of(effects), self.pi.torque_limit
+        records, turned = (tuple(followed(r, also.slope) for r in part) for part in (self.records, self.turned))
         limited = self.pi.with_limits(torque, min(also.integrator, self.pi.limits[1]))
         return replace(self, records=records, turned=turned, controller=limited)
 
@@ -352,23 +363,7 @@ class DataSet:
 def replayed(rec: Record, controller: Controller | None, effects: Mapping[Term, Vector]) -> Vector:
     """What the controller makes of command and measured velocity, with effects of its own [N m]."""
     assert controller is not None and controller.replayable(rec)
-    return controller.torque_of(rec, _limiting(effects) if effects else None)
-
-
-def _limiting(effects: Mapping[Term, Vector]) -> Limiting:
-    """What all effects at the controller limit."""
-    also = Limiting()
-    for term, values in effects.items():
-        assert term.limiting is not None
-        also = also.and_also(term.limiting(values))
-    return also
-
-
-def _followed(rec: Record, slope: float) -> Record:
-    """The record with the command as a controller follows it, with at most this slope [rad/s^2]."""
-    if rec.command is None or not np.isfinite(slope):
-        return rec
-    return rec.with_channels(command=rate_limited(rec.command, slope, rec.dt, 0.0))
+    return controller.torque_of(rec, limiting_of(effects) if effects else None)
 
 
 def with_angle(rec: Record, angle: Vector | None) -> Record:

@@ -38,7 +38,18 @@ from gaident.estimation.projection import WORST, inverse_of, project_out
 from gaident.models.drive_torque import driven_by, torque_of
 from gaident.policy.table import POLICY
 
-__all__ = ["covariance_of_numbers", "moved", "numbers_in", "of_controller", "refined", "slopes", "variance_of", "worth"]
+__all__ = [
+    "covariance_of_numbers",
+    "moved",
+    "numbers_in",
+    "of_ages",
+    "of_controller",
+    "of_numbers",
+    "refined",
+    "slopes",
+    "variance_of",
+    "worth",
+]
 
 Vector = NDArray[np.float64]
 Matrix = NDArray[np.float64]
@@ -82,20 +93,34 @@ def variance_of(objective: Objective, fit: Fit, v: Vector) -> float:
 
 def of_controller(objective: Objective, fit: Fit) -> Matrix:
     """What the numbers of the controller that were found, and its clock, bring into the covariance of x; 0 for neither."""
+    return of_numbers(objective, fit) + of_ages(objective, fit)
+
+
+def of_numbers(objective: Objective, fit: Fit) -> Matrix:
+    """The part of the numbers of the controller that were found; 0 where none were."""
     v, J = objective.linearised(fit.hypothesis, fit.x, fit.noise)
-    part = np.zeros((len(fit.x), len(fit.x)))
-    seen = np.array([i for i in np.flatnonzero(fit.parameters.steps() > 0.0) if np.all(np.isfinite(J[i])) and np.any(J[i])])
-    if not len(seen):
-        return part
-    if fit.predictor.data.found is not None:
+    part, seen = np.zeros((len(fit.x), len(fit.x))), _seen(fit, J)
+    if len(seen) and fit.predictor.data.found is not None:
         E = _changes(objective, fit.hypothesis, fit.x, fit.noise, v)
         S = _answers(J[seen], E)
         part[np.ix_(seen, seen)] = S @ _spread(objective, fit, v, J, E) @ S.T
-    others = [f.x - fit.x for age in fit.predictor.data.other_ages if (f := _of_age(objective, fit, age)) is not None]
-    if others:
-        furthest = max(others, key=lambda move: float(np.sum((move @ J) ** 2)))
-        part += np.outer(furthest, furthest)
     return part
+
+
+def of_ages(objective: Objective, fit: Fit) -> Matrix:
+    """The part of an age of the velocity that the model does not exclude; 0 where there is one alone."""
+    J = objective.linearised(fit.hypothesis, fit.x, fit.noise)[1]
+    others = [f.x - fit.x for age in fit.predictor.data.other_ages if (f := _of_age(objective, fit, age)) is not None]
+    if not len(_seen(fit, J)) or not others:
+        return np.zeros((len(fit.x), len(fit.x)))
+    furthest = max(others, key=lambda move: float(np.sum((move @ J) ** 2)))
+    return np.outer(furthest, furthest)
+
+
+def _seen(fit: Fit, J: Matrix) -> NDArray[np.intp]:
+    """The coordinates that a fit moves and that show in the errors, of the slopes J."""
+    moved = np.flatnonzero(fit.parameters.steps() > 0.0)
+    return np.array([i for i in moved if np.all(np.isfinite(J[i])) and np.any(J[i])], dtype=np.intp)
 
 
 def covariance_of_numbers(objective: Objective, fit: Fit) -> Matrix:
@@ -191,13 +216,13 @@ def _answers(J: Matrix, E: Matrix) -> Matrix:
 def _of_age(objective: Objective, fit: Fit, age: float) -> Fit | None:
     """The model with another age of the velocity; None where its errors are clearly larger.
 
-    Where the torque does not follow from the controller, it is not known between the lines of the log.
+    Where the torque does not follow from the controller, it is not known between the lines of a log that may be slower.
     A wrong age may then compensate for the unknown torque, so that no age is excluded.
     """
     data = fit.predictor.data.aged(age)
     other = _under(objective, data, fit) if data.found is None or not data.found.joint else refined(objective, fit, data)
     more = gained(other.cost, fit.cost, objective.information)
-    return None if data.loop_follows and more > POLICY.rival_margin else other
+    return None if data.known_between and more > POLICY.rival_margin else other
 
 
 def _change(objective: Objective, hypothesis: Hypothesis, x: Vector, noise: NoiseFilter, v: Vector, by: Vector) -> Vector:

@@ -9,20 +9,20 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-if TYPE_CHECKING:
-    from gaident.control.controller import Limiting
+from gaident.control.controller import Limiting
 
-__all__ = ["Scales", "Term"]
+__all__ = ["PHASE", "Scales", "Term", "limiting_of"]
 
 Vector = NDArray[np.float64]
 Matrix = NDArray[np.float64]
 Natural = Callable[[Matrix], Matrix]
 Rows = list[tuple[float, ...]]
+
+PHASE = 1.0  # no decision: a formula: rad; by so much a phase is off where its two components are off by the amplitude
 
 
 @dataclass(frozen=True)
@@ -92,6 +92,7 @@ class Term:
     other_side: str = ""  # name of the same effect at the other end of the shaft
     at_load: bool = False  # of two masses: it acts there
     curve: Callable[[Vector, Mapping[str, float]], Vector] | None = None  # static torque at velocities [rad/s], as friction
+    scales: Mapping[str, float] = field(default_factory=dict)  # parameter whose 0 is nothing special -> what is much for it
 
     def stands_with(self, effects: Iterable[str]) -> bool:
         """Whether a model with these effects contains what its torque depends on."""
@@ -150,6 +151,15 @@ class Term:
     def needs_two_masses(self) -> bool:
         """Whether only a model of two masses may have it."""
         return self.in_coupling or self.at_load
+
+
+def limiting_of(effects: Mapping[Term, Vector]) -> Limiting:
+    """What all effects at the controller limit, each with its parameters."""
+    also = Limiting()
+    for term, values in effects.items():
+        assert term.limiting is not None
+        also = also.and_also(term.limiting(values))
+    return also
 
 
 _UNIT = Scales(1e-3, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 100.0, True, 1.0)

@@ -18,7 +18,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from gaident.estimation.found_numbers import of_controller, variance_of
+from gaident.estimation.found_numbers import of_ages, of_numbers, variance_of
 from gaident.estimation.least_squares import fit as fitted
 from gaident.estimation.objective import Fit, Objective
 from gaident.estimation.projection import inverse_of
@@ -26,7 +26,7 @@ from gaident.models.effects import row_of
 from gaident.policy.table import POLICY
 from gaident.results.estimate import Estimate
 
-__all__ = ["controller_part", "covariance_of", "estimates_of"]
+__all__ = ["age_part", "controller_part", "covariance_of", "estimates_of"]
 
 BLOCKS = 8  # no decision: how many parts of a jackknife
 
@@ -41,7 +41,13 @@ def covariance_of(objective: Objective, fit: Fit) -> Matrix:
 
 def controller_part(objective: Objective, fit: Fit) -> Matrix:
     """The part of the covariance that comes from the numbers of the controller. Computed once for a fit."""
-    return objective.once(("controller part", fit.key), lambda: of_controller(objective, fit))
+    numbers = objective.once(("part of the numbers", fit.key), lambda: of_numbers(objective, fit))
+    return numbers + age_part(objective, fit)
+
+
+def age_part(objective: Objective, fit: Fit) -> Matrix:
+    """What of that part comes from the age of the velocity, where the records do not show it. Computed once for a fit."""
+    return objective.once(("part of the age", fit.key), lambda: of_ages(objective, fit))
 
 
 def _covariance(objective: Objective, fit: Fit) -> Matrix:
@@ -108,7 +114,9 @@ def estimates_of(objective: Objective, fit: Fit) -> dict[str, dict[str, Estimate
         for i, (name, unit) in enumerate((p.name, p.unit) for p in row.parameters):
             std = float("inf") if lost[i] else float(np.sqrt(max(variances[i], 0.0)))
             value = float(values[i])
-            known = std < abs(value) if value != 0.0 else np.isfinite(std)
+            # A phase of 0 is as good as any other: it is not compared with itself.
+            size = term.scales.get(name, abs(value))
+            known = std < size if size > 0.0 else np.isfinite(std)
             part_of_it = float(np.sqrt(max(parts[i], 0.0)))
             result[effect][name] = Estimate(value, std, unit, bool(bound[i]), bool(known), part_of_it)
     return result

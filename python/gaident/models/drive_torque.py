@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from gaident.arguments import TORQUE
 from gaident.axis import Text, say
 from gaident.control import core
+from gaident.control.beside import beside_pi
 from gaident.control.controller import Controller
 from gaident.control.pi import PI, bare_pi
 from gaident.control.pi_torque import pi_block
@@ -38,6 +39,7 @@ __all__ = [
 
 Vector = NDArray[np.float64]
 
+TWO_MASSES = 3  # no decision: how many poles two masses have
 HALF = 0.5  # no decision: of a sample, the age of a mean over it
 
 
@@ -66,11 +68,9 @@ def torque_driven(records: Sequence[Record], controller: Controller | None) -> D
         return Driven(tuple(records), controller)
     every = max(controller.log_every(r.dt) for r in records)
     if every == 1:
-        text = (
-            "The given controller is not kp and ki with the trapezoidal rule alone; it has another rule, a filter, a feedforward "
-            "or a limit. So the linear model is identified from its {torque}, not in a simulated loop."
-        )
-        note = say(text)
+        has = beside_pi(controller)
+        text = "Your controller has {}; so the linear model is identified from its {torque}, not in a simulated loop."
+        note = say(text, f"{has} beside kp and ki" if has else "a sample time of its own")
     else:
         text = (
             "The controller samples {} times for each line of the log. The linear model is identified from the logged "
@@ -186,9 +186,14 @@ def made_by(rec: Record, controller: Controller) -> Vector:
     """The torque [N m] (n,) that the controller makes of command and measured signals; RecordError where it cannot be made."""
     every = controller.log_every(rec.dt)
     if every > 1:
+        linear = (
+            "identify takes such a log as it is, but no diagnosis does. " if controller.line_equation(rec, TWO_MASSES) else ""
+        )
         raise RecordError(
             f"the record has no torque, and the controller samples {every} times for each of its lines: what it made between "
-            f"the lines of the velocity is lost; give {TORQUE}"
+            f"the lines of the velocity is lost; give {TORQUE}, or log each of its samples. {linear}"
+            "Where there is neither, leave the controller's period out: it is then taken for one at the rate of the log. What is "
+            "found is then approximate: an inertia is off by several percent, and a delay may be found that the drive has not"
         )
     if not controller.replayable(rec):
         needed = "a command" if controller.driven_by == "command" else "a position_command and a position"

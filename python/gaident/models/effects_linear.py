@@ -22,6 +22,12 @@ class Transfer(NamedTuple):
     zeros: tuple[complex, ...] = ()
     delay: float = 0.0  # s
 
+    @property
+    def late(self) -> float:
+        """By how much a slow signal comes out later than it went in [s]: minus the slope of the phase over omega at 0."""
+        turned = sum(1.0 / zero for zero in self.zeros) - sum(1.0 / pole for pole in self.poles)
+        return self.delay + complex(turned).real
+
 
 def _resonance(values: Sequence[float]) -> Transfer:
     """(wp/wz)^2 (s^2 + 2 zz wz s + wz^2)/(s^2 + 2 zp wp s + wp^2)."""

@@ -9,6 +9,7 @@ from gaident import _core
 from gaident.arguments import A_CONTROLLER, COMMAND, NO_CONTROLLER, TORQUE
 from gaident.control import core
 from gaident.control.controller import Controller, checked_controller
+from gaident.control.filtering import rate_limited
 from gaident.data.record import Record
 from gaident.errors import ModelError, RecordError
 from gaident.models.discrete import require_strictly_proper
@@ -19,6 +20,13 @@ from gaident.models.model import Model
 Signal = NDArray[np.float64]
 AnyModel = Model | OneMass | TwoMass
 MAX_SUBSTEPS = 64  # no decision: what an argument may be
+
+
+def followed(rec: Record, slope: float) -> Record:
+    """The record with the command as a controller follows it, with at most this slope [rad/s^2]."""
+    if rec.command is None or not np.isfinite(slope):
+        return rec
+    return rec.with_channels(command=rate_limited(rec.command, slope, rec.dt, 0.0))
 
 
 def as_model(model: AnyModel) -> Model:

@@ -29,7 +29,7 @@ class Estimate:
     at_bound : bool
         Whether the value is at a bound of its search range.
     identifiable : bool
-        Whether the record determines the value to better than its own size.
+        Whether the record determines the value to better than its own size, a phase to better than 1 rad.
     of_controller : float
         The part of `std` that numbers and clock of the controller bring in, where the records had to show these: its square is
         part of that of `std`. 0 where they were given.

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, field, fields
 from typing import Any
 
 import numpy as np
@@ -55,14 +55,14 @@ class Limits:
     duration: float = 5.0
 
     def __post_init__(self) -> None:
-        for field in fields(self):
-            value = getattr(self, field.name)
-            if field.name == "travel" and value == math.inf:
+        for limit in fields(self):
+            value = getattr(self, limit.name)
+            if limit.name == "travel" and value == math.inf:
                 continue
-            number = real_number(value, field.name, SettingsError, "give one number > 0")
+            number = real_number(value, limit.name, SettingsError, "give one number > 0")
             if number <= 0.0:
-                raise SettingsError(f"{field.name} is {number:g}: give one number > 0")
-            object.__setattr__(self, field.name, number)
+                raise SettingsError(f"{limit.name} is {number:g}: give one number > 0")
+            object.__setattr__(self, limit.name, number)
 
     @classmethod
     def of(cls, records: Record | Sequence[Record], controller: PI | None = None, axis: str = "rotary") -> Limits:
@@ -103,13 +103,16 @@ class Proposal:
     dt : float
         Time from value to value [s].
     separates : tuple of str
-        Names of effects that it tells apart, or makes visible where there is no record yet.
+        Names of effects that it tells apart, or makes visible where there is no record yet; of such as no record tells apart one.
     margin : float
         BIC units by which the wrong one of two rivals would be worse (10 tell them apart); nan where nothing was compared.
     reason : str
         Why this experiment, in plain sentences.
     position_command : ndarray of shape (n,) or None
         Position command [rad] from the start, of a loop that a position drives; None for every other.
+    alike : mapping of str to tuple of str
+        One of `separates` -> the other explanations that act as it does on every record: this experiment tells them from the
+        rest of `separates`, but not from each other.
 
     See Also
     --------
@@ -123,6 +126,7 @@ class Proposal:
     margin: float
     reason: str
     position_command: Vector | None = None
+    alike: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
 
     @property
     def duration(self) -> float:
@@ -137,6 +141,7 @@ class Proposal:
             **place,
             "dt": self.dt,
             "separates": list(self.separates),
+            **({"alike": {name: list(others) for name, others in self.alike.items()}} if self.alike else {}),
             "margin": self.margin,
             "reason": self.reason,
             "linear_axis": linear_sentences([self.reason]),
@@ -149,7 +154,8 @@ class Proposal:
         reason = restored(str(data["reason"]), data.get("linear_axis", {}))
         place = data.get("position_command")
         path = None if place is None else np.asarray(place, dtype=np.float64)
-        return cls(command, float(data["dt"]), tuple(data["separates"]), float(data["margin"]), reason, path)
+        alike = {name: tuple(others) for name, others in data.get("alike", {}).items()}
+        return cls(command, float(data["dt"]), tuple(data["separates"]), float(data["margin"]), reason, path, alike)
 
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, Proposal):

@@ -32,7 +32,7 @@ class Fitness:
     torque_rms : float or None
         Root mean square of the torque itself, over the same samples [N m].
     force_floor : float or None
-        What noise leaves of the force error at most [N m].
+        What noise and, of an extended model, the filter leave of the force error at most [N m].
 
     See Also
     --------

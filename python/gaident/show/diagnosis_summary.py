@@ -219,9 +219,8 @@ def noise_words(dia: Diagnosis) -> Text:
 def not_the_loop_words(dia: Diagnosis) -> Text:
     """What the free runs are, where the given controller is not the drive's."""
     if dia.torque_logged:
-        return say(
-            "The given controller is not the drive's (see above): the logged {torque} drives these models, no loop is closed."
-        )
+        text = "The logged {torque} does not follow from this controller (see above): it drives these models, no loop is closed."
+        return say(text)
     return Text("The simulated controller is not the drive's (see above): these figures include its errors.")
 
 
@@ -266,8 +265,9 @@ def fall_words(dia: Diagnosis) -> str:
         else:
             hidden = Text(": the loop's integrator hides this effect in the velocity")
         return say("The error of the velocity hardly changes ({:+.1f} %){}.", -fall, hidden)
-    interval = f" (95 % interval {low:.0f} to {high:.0f} %)" if math.isfinite(low) else ""
-    return say("The error falls by {:.0f} %{}.", fall, interval)
+    digits = next((d for d in range(4) if f"{low:.{d}f}" != f"{high:.{d}f}"), None) if math.isfinite(low) else None
+    interval = f" (95 % interval {low:.{digits}f} to {high:.{digits}f} %)" if digits is not None else ""
+    return say("The error falls by {:.{}f} %{}.", fall, digits or 0, interval)
 
 
 def _growth_words(dia: Diagnosis, growth: float) -> Text:
@@ -387,8 +387,9 @@ def _next(dia: Diagnosis, axis: str) -> list[str]:
 def next_words(dia: Diagnosis, p: Proposal) -> Text:
     """Why the experiment p comes next, what it tells apart and how surely."""
     margin = f", {certainty(p.margin)} ({p.margin:.0f} BIC units, 10 are enough)" if math.isfinite(p.margin) else ""
-    text = say("{} It tells {}{}.", p.reason, joined(" from ", map(called, p.separates)), margin)
-    rest = dict.fromkeys(a for f in dia.findings for a in f.alternatives if a not in p.separates)
+    told = [(name, *p.alike.get(name, ())) for name in p.separates]
+    text = say("{} It tells {}{}.", p.reason, joined(" from ", (joined(" or ", map(called, names)) for names in told)), margin)
+    rest = dict.fromkeys(a for f in dia.findings for a in f.alternatives if not any(a in names for names in told))
     return say("{} It was not chosen for {}.", text, joined(" or ", map(called, rest))) if rest else text
 
 

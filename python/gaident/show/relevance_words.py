@@ -23,7 +23,7 @@ def relevance_words(dia: Diagnosis, axis: str, scales: Scales) -> str:
     torque = word("torque", axis)
     size = f"{_shown(r.velocity, v, scales)} rms in the velocity" if r.velocity else "nothing in the velocity"
     if r.torque is not None:
-        size += f" and {_shown(r.torque, u, scales)} rms in the {torque}"
+        size += f" and {_shown(r.torque, u, scales)} rms in the {torque}" if r.torque else f" and nothing in the {torque}"
     asked = [
         f"{_shown(value, si, scales)} of the {name}"
         for value, si, name in ((r.velocity_accuracy, v, "velocity"), (r.torque_accuracy, u, torque))

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from gaident.axis import identifier_words, said, say, unit
+from gaident.axis import Text, identifier_words, said, say, unit
+from gaident.policy.table import POLICY
 from gaident.results.diagnosis import Diagnosis
 from gaident.show.wording import number, with_std
 
@@ -20,7 +21,7 @@ def force_rows(dia: Diagnosis, axis: str) -> list[tuple[str, str, str]]:
     if dia.model.effects and before.force_error is None and after.force_error is not None:
         rows.insert(0, (fits[0][0], "diverges", ""))
     if rows and after.force_floor is not None:
-        rows.append(("what noise leaves", number(after.force_floor), ""))
+        rows.append(("what noise and filter leave", number(after.force_floor), ""))
     return rows
 
 
@@ -28,9 +29,23 @@ def force_words(dia: Diagnosis, axis: str) -> str:
     """What the force error is, and where it is the figure to go by."""
     which = "logged {torque}" if dia.torque_logged else "{torque} that the controller makes of the logged signals"
     text = say("The " + which + " minus the {torque} that the model needs for the measured motion.")
+    if growth := _growth_words(dia):
+        text = say("{} {}", text, growth)
     if dia.force_reason:
         text = say("{} It is the figure to go by here: {}.", text, dia.force_reason)
     return said(text, axis)
+
+
+def _growth_words(dia: Diagnosis) -> Text:
+    """What is said where the extended model misses more of the torque than the mechanism without effects; empty elsewhere."""
+    before, after, floor = dia.before.force_error, dia.after.force_error, dia.after.force_floor
+    if not dia.model.effects or before is None or after is None or after - before < POLICY.check_share * after:
+        return Text("")
+    text = say("The extended model misses more of it than the mechanism without effects")
+    if floor is not None and after < POLICY.loses * floor:
+        why = "so would a right model: the filter takes from the motion what is fast at reversals and impacts"
+        return say("{}; {}.", text, why)
+    return say("{}: what it names is not all that there is.", text)
 
 
 def comparison_rows(dia: Diagnosis, axis: str) -> list[tuple[str, str, str, str, str]]:

@@ -47,6 +47,16 @@ def test_it_says_what_is_wrong_and_writes_files(here: Path, capsys: pytest.Captu
     assert "contains no identification" in refusal(["diagnose", "run0.csv", *LOOP, "--model", "dia.json"], capsys)
 
 
+def test_what_was_found_outside_of_an_expected_range_is_said(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """A range of the drive file bounds no search; of a resonance that is not there nothing is said."""
+    told = "The inertia was found as"
+    for inertia, said in (("[1e-5, 2e-5]", True), ("[1e-5, 1.0]", False)):
+        Path("drive.toml").write_text(f"[space]\ninertia = {inertia}\nresonance_hz = [200, 220]\n")
+        assert main(["diagnose", "run0.csv", "--validation", "run1.csv", *LOOP, "--drive", "drive.toml"]) == 0
+        out = " ".join(capsys.readouterr().out.split())
+        assert (told in out) == said and "resonance was found" not in out
+
+
 def test_json_is_what_out_saves_and_a_model_is_taken(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["identify", "run0.csv", *LOOP, "--p", "1", "--q", "0", "--out", "idn.json"]) == 0
     capsys.readouterr()

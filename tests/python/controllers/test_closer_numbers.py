@@ -18,7 +18,7 @@ from gaident.diagnosis.controller.log_shift import Aligned
 from gaident.diagnosis.explain.wording import closer_numbers, of_the_mechanics
 from gaident.results.estimate import Estimate
 from gaident.results.finding import Finding
-from one_mass import STEPS, TAU, filtered
+from one_mass import PI, STEPS, TAU, data_of, filtered, loop_record
 
 Z, STD = np.log([TAU]), 0.3
 FILTER, WEIGHT = "velocity_feedback_filter", "command_weight"
@@ -33,6 +33,7 @@ def named(z: NDArray[np.float64], covariance: NDArray[np.float64]) -> dict[str, 
 
 FOUND = FoundNumbers(filtered, Z, np.array([[STD**2]]), named=named)
 """As the torque showed them."""
+DATA = data_of(loop_record(), FOUND)
 
 
 def driving() -> Driving:
@@ -98,10 +99,31 @@ def test_where_the_controller_makes_most_of_a_deviation_that_is_said(part: float
         "viscous_friction": Estimate(2e-3, 1e-4, "N m s/rad"),
         "resonance": Estimate(100.0, 0.0, "Hz", of_controller=0.0),
     }
-    notes = [said(note, "rotary") for note in of_the_mechanics(mechanics)]
+    notes = [said(note, "rotary") for note in of_the_mechanics(mechanics, {}, DATA, True)]
     assert len(notes) == noted
     if noted:
         assert "Most of the deviation of inertia comes from" in notes[0], "of no other"
+        assert "left open: give them" in notes[0]
+        (wrong,) = of_the_mechanics(mechanics, {}, DATA, False)
+        assert "as given do not fit these records" in wrong and "give them" not in wrong
     both = {**mechanics, "viscous_friction": Estimate(2e-3, 1e-4, "N m s/rad", of_controller=1e-4)}
-    (note,) = of_the_mechanics(both)
+    (note,) = of_the_mechanics(both, {}, DATA, True)
     assert ("inertia, viscous friction" in said(note, "rotary")) is noted
+
+
+def test_what_the_age_of_the_velocity_makes_of_a_deviation_is_said_of_it_and_what_would_show_it() -> None:
+    mechanics = {
+        "inertia": Estimate(3e-4, 1e-5, "kg m^2", of_controller=0.99e-5),
+        "stiffness": Estimate(20.0, 0.1, "N m/rad", of_controller=0.09),
+    }
+    ages = {"inertia": 0.99e-5, "stiffness": 0.01}
+    numbers, age = of_the_mechanics(mechanics, ages, DATA, True)
+    assert numbers.startswith("Most of the deviation of stiffness comes from the numbers")
+    assert age.startswith("Most of the deviation of inertia comes from the age of the velocity")
+    assert "give the period of the controller" in age
+    given = replace(DATA, clocked=True)
+    _, age = of_the_mechanics(mechanics, ages, given, True)
+    assert "period" not in age and "log the encoder's angle" in age
+    slow = replace(given, loop_follows=False, controller=ga.Cascade(PI, period=DATA.dt / 4))
+    _, age = of_the_mechanics(mechanics, ages, slow, True)
+    assert "give the controller that makes this torque" in age

@@ -12,9 +12,11 @@ import pytest
 
 import gaident as ga
 from gaident import _core
+from gaident.control.beside import beside_pi
 from gaident.control.cascade import controller_of
 from gaident.control.pi import PI
 from gaident.errors import ControllerError
+from gaident.models.drive_torque import torque_driven
 
 
 def test_defaults_are_a_digital_controller_without_limits() -> None:
@@ -143,3 +145,25 @@ def test_controllers_answer_for_themselves() -> None:
     assert holding.with_limits(None, None) == ga.PI(0.1, 1.0), "without a limit there is nothing to hold at"
     assert np.array_equal(other.torque_of(REC), ga.Cascade(other).torque_of(REC))
     assert [controller_of(c.to_dict()) for c in (bare, other, cascade)] == [bare, other, cascade]
+
+
+def test_what_a_controller_has_beside_its_gains_is_said_by_name() -> None:
+    """No reproach: the reader gave it, and is told what follows from it."""
+    pi = ga.PI(1.0, 2.0, rule="backward", torque_limit=12.0)
+    assert beside_pi(ga.PI(1.0, 2.0)) == ""
+    assert beside_pi(pi) == "the backward rule and a torque limit"
+    whole = ga.Cascade(
+        ga.PI(1.0, 2.0, torque_limit=12.0, anti_windup="hold"),
+        position=ga.P(30.0),
+        acceleration_feedforward=1e-3,
+        torque_filters=(ga.LowPass(1e-3), ga.Notch(100.0, 0.1, 0.5)),
+        velocity_filters=(ga.LowPass(1e-3),),
+        delay=1e-4,
+    )
+    assert beside_pi(whole) == (
+        "a torque limit, an anti-windup, a position controller, an acceleration feedforward, 2 torque filters, a velocity filter "
+        "and a delay"
+    )
+    rec = ga.Record(1e-3, command=np.ones(30), velocity=np.zeros(30), torque=np.ones(30))
+    (note,) = torque_driven([rec], pi).notes
+    assert note.startswith("Your controller has the backward rule and a torque limit beside kp and ki; so ")

@@ -228,6 +228,23 @@ def test_what_is_lost_between_the_lines_is_an_error() -> None:
         ga.identify(rec.with_channels(torque=None), drive)
 
 
+def test_without_a_torque_the_refusal_of_a_faster_controller_leads_on() -> None:
+    """To identify, where its loop is one equation, and to a diagnosis without its sample time, which says what is lost."""
+    command = np.repeat([0.0, 10.0, -20.0, 15.0, -5.0, 30.0], 50)
+    linear = ga.Cascade(ga.PI(0.05, 1.0, rule="backward"), period=0.25e-3)
+    drive = ga.OneMass(1e-3, 0.01).model()
+    done = ga.run(drive, ga.Record(1e-3, command=command, velocity=0.0 * command), linear)
+    noise = 0.01 * np.random.default_rng(0).standard_normal(len(command))
+    rec = ga.Record(1e-3, command=command, velocity=done.velocity + noise)
+    with pytest.raises(ga.errors.RecordError, match=r"identify takes such a log as it is.*leave the controller's period out"):
+        ga.diagnose(rec, linear)
+    limited = replace(linear, velocity=ga.PI(0.05, 1.0, torque_limit=9.0))
+    with pytest.raises(ga.errors.RecordError, match=r"or log each of its samples\. Where there is neither, leave"):
+        ga.diagnose(rec, limited)
+    assert ga.identify(rec, linear).fit_percent > 90.0
+    assert ga.diagnose(rec, replace(linear, period=None)).mechanics["inertia"].value == pytest.approx(1e-3, rel=0.1)
+
+
 WRONG: dict[str, tuple[Any, str]] = {
     "rule": (lambda: ga.PI(1.0, 1.0, rule="euler"), "rule is 'euler'"),
     "weight": (lambda: ga.PI(1.0, 1.0, command_weight=-1.0), "command_weight is -1"),

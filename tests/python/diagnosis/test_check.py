@@ -10,9 +10,10 @@ import pytest
 
 import gaident as ga
 from drive_rig import Plant, rig, skip_without_library
-from gaident.diagnosis.check import Check, checked
+from gaident.diagnosis.check import Check, _of_the_filter, checked
 from gaident.diagnosis.gains import Gains
 from gaident.estimation.dataset import DataSet
+from gaident.estimation.regression.force_error import FilteredRecords
 from gaident.results.diagnosis import Fitness
 
 skip_without_library()
@@ -62,6 +63,24 @@ def test_at_the_truth_both_agree_and_nothing_is_noted() -> None:
     assert check.after.force_error < check.force_error < 0.02 * check.after.torque_rms
     assert check.after.force_percent == pytest.approx(100.0 * check.after.force_error / check.after.torque_rms)
     assert "gravity" in check.reason
+
+
+def test_what_the_filter_leaves_of_a_right_model_is_no_error_of_it() -> None:
+    """Without any noise friction alone leaves a force error at its reversals; a wrong inertia leaves more than that."""
+    rec = rig(PLANT, COMMAND, {"coulomb_friction": FRICTION}, noise="none", position_logged=True)
+    rec = ga.Record(rec.dt, velocity=rec.velocity, torque=rec.torque, position=rec.position)
+    right, wrong = (check_of(rec, inertia=J, coulomb_friction=FRICTION).after for J in (3e-4, 3.6e-4))
+    assert right.force_error is not None and right.force_floor is not None and right.torque_rms is not None
+    assert right.force_error > 1e-4 * right.torque_rms
+    assert 0.5 < right.force_error / right.force_floor < 1.5
+    assert wrong.force_error > 5.0 * wrong.force_floor  # type: ignore[operator]
+
+
+def test_a_run_that_misses_the_motion_measures_no_filter() -> None:
+    """A pendulum under its own torque falls another way: what its model leaves there says nothing of the record."""
+    rec = record(unbalance=SWING)
+    model = ga.OneMass(3e-4, PLANT.D).model().with_effect("unbalance", amplitude=10.0, phase=0.4)
+    assert _of_the_filter(model, FilteredRecords((rec,), (0,), 20.0)) == 0.0
 
 
 def test_a_wrong_inertia_is_contradicted_with_both_numbers() -> None:

@@ -147,7 +147,7 @@ def test_a_diagnosis_names_the_controller_and_no_mechanics() -> None:
     assert dia.verdict == "explained" and isinstance(dia.controller, ga.Cascade)  # as it was used
     assert dia.controller.velocity.command_weight == 0.0 and len(dia.controller.torque_filters) == 1
     assert dia.mechanics["inertia"].value == pytest.approx(1e-3, rel=0.01)
-    assert "The controller is not the given PI" in dia.summary()
+    assert "The given gains alone do not make the logged torque" in dia.summary()
 
 
 @pytest.mark.parametrize(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -11,9 +12,13 @@ from numpy.typing import NDArray
 import gaident as ga
 from drive_rig import Plant, rig
 from gaident.cli import main
+from gaident.diagnosis.controller.driving import driving_of
+from gaident.diagnosis.controller.form_findings import loop_of
 from gaident.diagnosis.controller.log_shift import Aligned, aligned
 from gaident.errors import ReadError, RecordError
 from gaident.estimation.regression.torque_lag import torque_lag
+from gaident.models.drive_torque import torque_driven
+from gaident.models.effects_linear import LINEAR, response_of
 
 RIGID = Plant(3e-4, 2e-3, 0.03, 1.9, 1e-3, name="rigid")
 ELASTIC = Plant(1e-4, 1e-3, 0.03, 1.0, 1e-3, JL=1e-4, DL=1e-3, KG=20.0, name="antiresonance at 71 Hz")
@@ -170,6 +175,49 @@ def test_in_open_loop_a_motion_before_its_torque_is_the_log_s_and_a_delay_is_onl
         )
         # A torque that follows from a controller stands on the lines of what it read.
         assert aligned([late], [], None, follows=True).notes == ()
+
+
+def slow(effects: dict[str, dict[str, float]]) -> tuple[ga.Record, ga.Cascade]:
+    """A log of a controller that samples twice to a line, with its rule, and that controller."""
+    pi = ga.PI(0.03, 1.9, rule="backward")
+    cascade = ga.Cascade(velocity=pi, period=0.5e-3)
+    plant = Plant(3e-4, 2e-3, 0.03, 1.9, 1e-3, cascade=cascade, name="two samples to a line")
+    return rig(plant, np.repeat(STEPS, 2), effects, "none"), cascade
+
+
+def test_where_the_torque_of_a_slow_log_follows_from_its_controller_no_shift_is_advised() -> None:
+    """What stands behind the torque is then found by the diagnosis; a wrong controller proves nothing."""
+    rec, cascade = slow({"velocity_filter": {"time_constant": 1e-3}})
+    assert "shift torque=1" in "".join(aligned([rec], [], None).notes), "alone the motion tells no more"
+
+    asked = loop_of([rec], cascade)
+    driven = torque_driven([rec], cascade)
+    found = driving_of(driven.records, (), asked, driven, {driven.records[0].digest: rec})
+    assert found.moved.notes == found.doubts == ()
+    (told,) = aligned([rec], [], None, refuted=True).notes
+    assert "the given controller does not make this torque" in told and "without a controller" not in told
+
+
+def test_a_lag_that_the_model_accounts_for_is_no_reason_to_shift_the_log() -> None:
+    rec = rig(RIGID, STEPS, DELAY).with_channels(command=None)
+    found = aligned([rec], [], None)
+    dia = ga.diagnose(rec)
+    assert [f.effect for f in dia.causes] == ["transport_delay"], dia.summary()
+    assert "shift torque=1" in found.notes[0], "before anything is found"
+    (note,) = [n for n in dia.notes if n.startswith("The motion follows")]
+    assert "The model has what makes that: the transport delay" in note and "shift torque" not in " ".join(dia.notes)
+    # A model that lacks it, or has only a part of it, leaves the advice.
+    for model in (dia.model.linear.mechanism, dia.model.mechanism.with_effect("transport_delay", delay=1e-4)):
+        assert found.notes[0] in found.noted(replace(dia, model=model)).notes
+    half = replace(dia, model=dia.model.mechanism.with_effect("torque_lag", time_constant=5e-4), velocity_age=0.5)
+    assert "the torque lag and the age of the velocity, 1 sample together" in found.noted(half).notes[0]
+
+
+def test_how_late_a_slow_signal_comes_out_is_the_slope_of_the_phase() -> None:
+    omega = np.array([1e-3])
+    for name, values in (("transport_delay", [2e-3]), ("torque_lag", [3e-3]), ("extra_resonance", [300.0, 0.1, 200.0, 0.02])):
+        transfer = LINEAR[name](values)
+        assert transfer.late == pytest.approx(-float(np.angle(response_of([transfer], omega))[0]) / omega[0], rel=1e-4)
 
 
 def test_a_torque_that_was_logged_late_in_open_loop_is_moved_and_the_inertia_is_right() -> None:

@@ -10,7 +10,7 @@ import pytest
 
 import gaident as ga
 from drive_cases import Truth, random_case
-from drive_rig import rig, skip_without_library
+from drive_rig import Noise, Plant, rig, skip_without_library
 from gaident.cli import main
 from gaident.diagnosis.library.equivalences import EQUIVALENT
 from gaident.policy.table import POLICY
@@ -61,6 +61,22 @@ def test_twins_get_the_missing_signal_instead_of_a_command() -> None:
     assert all("log" in e.otherwise or "repeat" in e.otherwise for e in EQUIVALENT), (
         "each class says what would tell its effects apart"
     )
+
+
+@pytest.mark.parametrize(("delay", "noise"), [(6e-4, 0.05), (4e-4, 0.02)])
+def test_what_no_record_tells_apart_is_told_from_a_third_explanation_as_one(delay: float, noise: float) -> None:
+    """A delay of a part of a sample: an experiment tells it from a lag or a filter, but never the one from the other."""
+    plant = Plant(3e-4, 2e-3, 0.03, 1.9, 1e-3)
+    command = np.repeat([5.0, -5.0, 8.0, -3.0], 60)
+    dia = ga.diagnose(rig(plant, command, {"transport_delay": {"delay": delay}}, Noise(white=noise)), plant.controller)
+    (finding,), proposal = dia.causes, dia.next_experiment
+    assert proposal is not None and {finding.effect, *finding.alternatives} >= {"torque_lag", "velocity_filter"}
+    assert set(proposal.separates) == {"transport_delay", "torque_lag"}
+    assert proposal.alike == {"torque_lag": ("velocity_filter",)}
+    told = " ".join(dia.summary().split())
+    assert "torque lag or velocity filter" in told.partition("It tells ")[2].partition(".")[0]
+    assert "from velocity filter" not in told and "not chosen for" not in told
+    assert Proposal.from_dict(proposal.to_dict()) == proposal
 
 
 def test_without_a_controller_there_is_no_command_to_propose() -> None:

@@ -12,9 +12,12 @@ import pytest
 
 import gaident as ga
 from gaident.diagnosis.explain.determined import determined, not_determined
-from gaident.diagnosis.explain.wording import of_the_mechanics
+from gaident.diagnosis.explain.expected import outside_of
+from gaident.diagnosis.explain.wording import basis_of, of_the_mechanics
 from gaident.diagnosis.library.terms import LIBRARY
 from gaident.diagnosis.selection.attribution import of_known_size
+from gaident.errors import SettingsError
+from gaident.estimation.dataset import DataSet
 
 module = importlib.import_module("gaident.diagnosis.work")
 
@@ -80,10 +83,37 @@ def test_a_negative_damping_is_said_beside_what_is_left_too(monkeypatch: pytest.
 
 def test_a_pair_with_a_negative_damping_is_said() -> None:
     damped = {"resonance_damping": ga.Estimate(0.02, 0.001, "1"), "antiresonance_damping": ga.Estimate(-0.0077, 0.0001, "1")}
-    (note,) = of_the_mechanics(damped)
+    data = DataSet.of([record(2)], None)
+    (note,) = of_the_mechanics(damped, {}, data, False)
     assert note.startswith("The antiresonance has a damping ratio of -0.0077, below 0 beyond its deviation")
     assert "load inertia and stiffness" in note and "load mass and stiffness" in note.linear
-    assert not of_the_mechanics(damped | {"antiresonance_damping": ga.Estimate(-0.0077, 0.004, "1")})
+    doubtful = damped | {"antiresonance_damping": ga.Estimate(-0.0077, 0.004, "1")}
+    assert not of_the_mechanics(doubtful, {}, data, False)
+
+
+def test_more_than_noise_is_no_contradiction_to_nothing_significant() -> None:
+    """Errors that are no noise, and yet depend on no signal beyond chance: both stand in one sentence."""
+    test, search = SimpleNamespace(contradicts=False), SimpleNamespace(whitens=False)
+    before = SimpleNamespace(space=SimpleNamespace(is_noise=lambda fit: False), final=None)
+    found: Any = SimpleNamespace(specification=test, space=search, whitened=before)
+    (alone,), (beside,) = (basis_of(found, left) for left in (False, True))
+    assert alone.startswith("What the model leaves is more than noise, but depends on no signal of these records beyond chance:")
+    assert beside.startswith("What the model leaves is more than noise: ")
+
+
+def test_a_value_outside_of_its_expected_range_is_said_where_it_is_so_beyond_its_deviation() -> None:
+    mechanics = {"inertia": ga.Estimate(3e-3, 1e-5, "kg m^2"), "resonance": ga.Estimate(186.34, 0.15, "Hz")}
+    (note,) = outside_of({"resonance_hz": (200.0, 220.0), "inertia": (1e-3, 5e-3)}, mechanics)
+    assert note.startswith("The resonance was found as 186.3 +- 0.15 Hz, outside of the range that was given (200 to 220)")
+    (note,) = outside_of({"inertia": (4e-3, 5e-3)}, mechanics)
+    assert "The mass was found as 0.003 +- 1e-05 kg, " in note.linear
+    assert not outside_of({"resonance_hz": (186.7, 220.0), "damping": (1.0, 2.0)}, mechanics)
+
+
+@pytest.mark.parametrize("wrong", [{"stiffness": (1, 2)}, {"inertia": 3.0}, {"inertia": (2, 1)}, {"damping": ("a", 2)}, 3])
+def test_a_wrong_expectation_is_refused(wrong: Any) -> None:
+    with pytest.raises(SettingsError, match=r"give a mapping with inertia, resonance_hz or damping, each a pair"):
+        ga.diagnose(record(2), ga.PI(kp=0.02, ki=0.5), expected=wrong)
 
 
 def test_that_none_is_named_is_said_only_where_none_is(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -176,14 +176,16 @@ def test_a_controller_that_refuses_its_numbers_is_none() -> None:
     assert found.then(lambda one: one.with_limits(2.0, None)).controller.limits[0] == 2.0  # type: ignore[union-attr]
 
 
-def aged(noise: float, *others: float, follows: bool = True) -> tuple[Objective, Fit]:
+def aged(noise: float, *others: float, follows: bool = True, clocked: bool = False) -> tuple[Objective, Fit]:
     """The one mass under a torque of slow waves, whose velocity may have other ages as well [lines]; noise: on it [rad/s]."""
     n = 720
     torque = 0.05 * np.sin(2.0 * np.pi * 3.0 * DT * np.arange(n)) + 0.02 * np.sin(2.0 * np.pi * 11.0 * DT * np.arange(n))
     driven = ga.Record(DT, torque=torque, velocity=np.zeros(n))
     model = ga.OneMass(J=J, D=D).model()
     seen = ga.simulate(model, driven) + noise * np.random.default_rng(3).standard_normal(n)
-    data = replace(DataSet.of([driven.with_channels(velocity=seen)], None), loop_follows=follows).aged(0.0, others)
+    data = replace(DataSet.of([driven.with_channels(velocity=seen)], None), loop_follows=follows, clocked=clocked).aged(
+        0.0, others
+    )
     return fit_over(data)
 
 
@@ -220,6 +222,9 @@ def test_an_age_that_leaves_clearly_more_is_excluded_where_the_torque_follows_fr
     # A torque that does not follow may go on between the lines: a model that leaves less may only make up for it.
     objective, fit = aged(0.003, 0.5, follows=False)
     assert of_controller(objective, fit)[0, 0] > 0.0
+    # But not where each line is a sample of the controller, which was given: that torque is held.
+    objective, fit = aged(0.003, 0.5, follows=False, clocked=True)
+    assert not of_controller(objective, fit).any()
 
 
 def test_of_several_ages_the_one_that_moves_the_model_furthest_counts() -> None:

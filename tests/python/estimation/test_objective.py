@@ -9,6 +9,7 @@ import pytest
 from numpy.typing import NDArray
 
 import gaident as ga
+from gaident.diagnosis.library.terms import LIBRARY
 from gaident.diagnosis.mechanics import mechanics_of
 from gaident.diagnosis.records.sizes import scales_of
 from gaident.estimation import uncertainty
@@ -109,6 +110,30 @@ def test_what_stands_in_masked_samples_passes_no_prefilter() -> None:
     # The mask costs next to nothing beside it: the line is near what stood there.
     whole = masked(lengths, []).under(OutputErrors(50.0, weigh)).whitened(e[None, :], WHITE)[0]
     assert np.std((found - whole)[objective.counted > 0.0]) < 0.1 * np.std(whole)
+
+
+def test_a_phase_is_determined_by_its_deviation_alone() -> None:
+    """0 is as good a phase as any other; only an amplitude that is not there leaves it open."""
+    one, t = ga.OneMass(J=1e-3, D=1e-3).model(), DT * np.arange(N)
+    rec = ga.Record(DT, velocity=np.zeros(N), torque=0.1 * np.sin(2.0 * np.pi * 2.0 * t))
+    scales = Scales(DT, 1.0, 50.0, 0.1, 1.0, 10.0, 0.002, float("nan"), float("nan"), False, 0.1)
+    term = LIBRARY["unbalance"]
+
+    def phase(amplitude: float, at: float, noise: float) -> ga.Estimate:
+        drive = one.with_effect("unbalance", amplitude=amplitude, phase=at)
+        seen = ga.simulate(drive, rec) + noise * np.random.default_rng(1).standard_normal(N)
+        data = DataSet.of([rec.with_channels(velocity=seen)], None)
+        parameters = Parameterisation.of(one, scales, [False])
+        hypothesis = Hypothesis(parameters, OpenLoop(data)).extended(term)
+        start = parameters.inserted(parameters.start(one), term.coordinates({"amplitude": amplitude, "phase": at}))
+        objective = Objective(data, np.ones(N))
+        return estimates_of(objective, fitted(objective, hypothesis, start, WHITE, 10))["unbalance"]["phase"]
+
+    found = phase(0.02, 0.0, 0.01)
+    assert abs(found.value) < 5.0 * found.std and found.std < 0.1 and found.identifiable
+    for at in (0.0, 0.7):
+        none = phase(1e-6, at, 0.3)
+        assert none.std > 1.0 and not none.identifiable
 
 
 def test_the_covariance_of_a_fit_is_worked_out_once(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -293,10 +293,33 @@ def test_an_error_that_grows_is_said_to_and_not_to_be_compared() -> None:
     result.loop_follows = False
     text = flat(summary(result))
     assert "worse than the linear one (the error of the velocity grows by 200 %): the simulated controller is not the" in text
-    assert "(see above): the logged torque drives these models, no loop is closed." in text
+    assert "does not follow from this controller (see above): it drives these models, no loop is closed." in text
     result.torque_logged = False
     text = flat(summary(result))
     assert "The simulated controller is not the drive's (see above): these figures include its errors." in text
+
+
+def test_a_torque_error_that_grows_is_explained_by_the_filter_or_counts_against_the_model() -> None:
+    result = fake()
+    result.before = replace(result.before, force_error=0.05, torque_rms=0.184)
+    result.after = replace(result.after, force_error=0.08, torque_rms=0.184, force_floor=0.07)
+    told = "The extended model misses more of it than the mechanism without effects"
+    assert f"{told}; so would a right model: the filter takes from the motion" in flat(summary(result))
+    result.after = replace(result.after, force_floor=0.002)
+    assert f"{told}: what it names is not all that there is." in flat(summary(result))
+    result.after = replace(result.after, force_error=0.0501)
+    assert told not in flat(summary(result)), "about the same"
+
+
+def test_an_interval_is_said_with_as_many_digits_as_its_ends_need() -> None:
+    result = fake()
+    for rmse, interval, said in (
+        (0.2, (0.55, 0.64), "The error falls by 60 % (95 % interval 55 to 64 %)."),
+        (0.0003, (0.9993, 0.99945), "The error falls by 99.94 % (95 % interval 99.93 to 99.94 %)."),
+        (0.2, (0.6, 0.6), "The error falls by 60 %."),
+    ):
+        result.after, result.gain_interval = replace(result.after, rmse=rmse), interval
+        assert said in flat(summary(result)), said
 
 
 def test_the_verdict_names_what_is_found_and_what_is_one_of_several() -> None:

@@ -92,6 +92,7 @@ def test_the_size_is_in_the_users_unit_with_si_behind() -> None:
         "negligible, as it is less than the noise."
     )
     assert said(Relevance(0.4, 0.3)).endswith("rms in the velocity; the noise is 2.9 rpm (0.3 rad/s).")
+    assert "and nothing in the torque; the noise" in said(Relevance(0.4, 0.3, 0.0, 0.01))
     asked = Relevance(0.4, 0.3, 0.002, 0.004, 0.5, 0.001)
     assert said(asked).endswith(
         "that was asked for, 4.8 rpm (0.5 rad/s) of the velocity and 0.001 N m of the torque, is not met."

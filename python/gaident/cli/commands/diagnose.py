@@ -126,6 +126,7 @@ def _diagnosed(args: Namespace) -> tuple[Drive, Diagnosis, list[Path]]:
             pitch=drive.pitch,
             accuracy=accuracy,
             quick=args.quick,
+            expected=drive.expected,
         )
         written = files.write(dia, records, validation or (), drive, lambda: dia.plot(axis=drive.axis), bar.doing)
     if following is not None and dia.next_experiment is not None:

@@ -53,6 +53,8 @@ def init_command(args: argparse.Namespace) -> None:
         print("to be filled in, marked FILL IN (write the value, remove the # before it):")
         for line in found.fill_in:
             print(f"  {line}")
+    if any(line.startswith("controller.") for line in found.fill_in):
+        print("also look at period, rule and torque_limit below [controller]: the torque follows from the drive's own alone")
     then = "then, once that is done" if found.fill_in else "then"
     print(f"{then}: {program()} diagnose {shlex.quote(str(args.log))} --drive {shlex.quote(str(target))}")
 

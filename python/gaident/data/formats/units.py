@@ -136,6 +136,7 @@ class Constants:
     resistance       of the motor's winding [Ohm], for a torque from its voltage
     inductance       of it [H]
     back_emf_constant  [V s/rad] (linear: [V s/m]); None: as the torque constant
+    screw            [m] that a turn of the motor moves: lengths and forces are then those of the motor's angle and torque
     """
 
     counts_per_turn: float | None = None
@@ -145,6 +146,7 @@ class Constants:
     resistance: float | None = None
     inductance: float | None = None
     back_emf_constant: float | None = None
+    screw: float | None = None
 
     def check(self) -> None:
         """Raise ReadError unless each constant is None or a positive finite number."""
@@ -207,12 +209,19 @@ def factor(quantity: str, unit: str | float, constants: Constants | None = None)
             f"known are {listed}; or give the factor to SI as a number, {arg('units', '0.5', quantity)}",
         )
     if row.constant is None:
-        return row.factor
+        return row.factor * (_of_the_motor(quantity, constants.screw) if row.axis == "linear" else 1.0)
     name, meaning = row.constant
     value: float | None = getattr(constants, name)
     if value is None:
         raise ReadError(f"units: {quantity} in {unit!r} needs a constant of the drive; give {arg(name, '...')} {meaning}")
     return row.factor / value if row.divide else row.factor * value
+
+
+def _of_the_motor(quantity: str, screw: float | None) -> float:
+    """What turns SI of a linear axis into that of the motor on its screw: q = 2 pi x/l, M = F l/(2 pi)."""
+    if screw is None:
+        return 1.0
+    return screw / _TURN if quantity == "torque" else _TURN / screw
 
 
 def needed_constant(quantity: str, unit: str) -> str | None:

@@ -23,7 +23,7 @@ from gaident.diagnosis.controller.measured_lag import Lag, commanded, lag_shown
 from gaident.diagnosis.controller.other_form import other_form
 from gaident.diagnosis.selection.other_gains import OTHER_GAINS, OtherGains
 from gaident.diagnosis.selection.unlogged_form import UnloggedForm
-from gaident.identification.logged_torque import corrected, not_followed
+from gaident.identification.logged_torque import comparable, corrected, not_followed
 from gaident.models.drive_torque import Driven, driven_by, straight_driven
 from gaident.results.estimate import Estimate
 from gaident.results.finding import Finding
@@ -43,6 +43,7 @@ class Driving:
     regained_from: the PI that was given, where records without a torque show other gains. lag: behind which a measured torque was
     logged; the records then contain the one before it. found: the controller's numbers that the records show.
     outliers: digest of a record as given -> lines whose velocity stands in the log alone, interpolated here.
+    clocked: whether the sample time of the controller was given. left_open: whether some of its numbers were not.
     """
 
     moved: Aligned
@@ -57,6 +58,8 @@ class Driving:
     lag: Lag | None = None
     found: FoundNumbers | None = None
     outliers: Mapping[str, NDArray[np.intp]] = field(default_factory=dict)
+    clocked: bool = False
+    left_open: bool = False
 
     def regained(self, other: OtherGains) -> Driving:
         """The same under other gains, which command and velocity show where no torque is logged; a finding says so."""
@@ -140,8 +143,8 @@ def driving_of(
     if lag is not None and pi is not None:
         notes = (*notes, lag.note)
         records, validation, origin = _again(records, validation, origin, partial(commanded, controller=pi))
-    follows = controller is not None and not doubts and all(controller.replayable(r) for r in whole)
-    moved = aligned(records, validation, pi, follows)
+    follows = controller is not None and not doubts and all(controller.replayable(r) or comparable(r, controller) for r in whole)
+    moved = aligned(records, validation, pi, follows, bool(doubts))
     form = (
         None if moved.shifts else driver_of(records, validation, pi, tuple(n.removeprefix("velocity.") for n in asked.estimates))
     )
@@ -151,6 +154,8 @@ def driving_of(
         if doubts and pi is None and controller is not None and not numbers:
             other = corrected(whole, controller)
             limited = other is None and by_a_limit(whole, controller)
+            if limited:
+                moved = aligned(records, validation, None, True)
             if other is not None:
                 controller, numbers, notes, doubts = other.controller, other.estimates, (*notes, *doubts, other.note), ()
                 found = other.found
@@ -168,7 +173,7 @@ def driving_of(
         # What this controller would make between the lines is not what the drive's made there.
         assert driven.controller is not None
         records, validation, origin = _again(records, validation, origin, partial(straight_driven, controller=driven.controller))
-        moved = aligned(records, validation, None)
+        moved = aligned(records, validation, None, refuted=True)
     moved = replace(moved, given={here: origin.get(rec.digest, rec) for here, rec in moved.given.items()})
     logged = as_logged(moved.records, pi)
     used = controller if bare_pi(controller) is None else logged.controller

@@ -219,7 +219,7 @@ def _unit(parameter: str) -> Text:
 def notes_of(shown: Shown, records: Sequence[Record]) -> tuple[Text, ...]:
     notes = [
         say(
-            "The controller is not the given PI, which does not make the logged {torque} (rms {:.2g} {N m}). One with {} does, "
+            "The given gains alone do not make the logged {torque} (rms {:.2g} {N m}). A controller with {} does, "
             "to {:.1g} {N m} rms{}.",
             shown.before,
             parts_of(shown),

@@ -15,6 +15,10 @@ Where the law holds for b > 0 alone, the log and a delay of the drive are not to
 Moving a commanded torque by b is right in either case: a delay of the drive then stands where the model has one,
 between torque and shaft, and is found there.
 A measured torque stands behind that delay, and is moved only where L agrees.
+
+A motion behind its torque needs no explanation where the torque follows from the controller, which reads and writes on the same
+lines, or where what the model has accounts for it.
+Delay, lag, filter and the age of the velocity make a slow motion late by their sum.
 """
 
 from __future__ import annotations
@@ -34,6 +38,7 @@ from gaident.estimation.criterion import gained
 from gaident.estimation.regression.torque_lag import TorqueLag, torque_lag
 from gaident.identification.notes import reading_notes
 from gaident.identification.replay.replay import replay
+from gaident.models.effects_linear import LINEAR
 from gaident.policy.table import POLICY
 from gaident.results.diagnosis import Diagnosis
 
@@ -41,6 +46,7 @@ __all__ = ["Aligned", "aligned"]
 
 Vector = NDArray[np.float64]
 
+REFUTED = say("the given controller does not make this {torque}, and without it")
 SHARES = (0.0, 0.5, -0.5)  # no decision: a formula: the rules of differencing that exist
 """Of ki dt, by which the newest error counts more than half: trapezoidal and rectangular integrals."""
 
@@ -50,6 +56,7 @@ class Aligned:
     """The records with their channels on the lines where the law holds.
 
     given: digest of a record as it is here -> as it was given. notes: what was moved, and what may have to be.
+    behind: note on a motion behind its torque -> the record's name, the motion's lag and the sample time [s].
     """
 
     records: tuple[Record, ...]
@@ -57,36 +64,46 @@ class Aligned:
     notes: tuple[Text, ...] = ()
     shifts: Mapping[str, Mapping[str, int]] = field(default_factory=dict)
     given: Mapping[str, Record] = field(default_factory=dict)
+    behind: Mapping[Text, tuple[str, TorqueLag, float]] = field(default_factory=dict)
 
     def noted(self, result: Diagnosis) -> Diagnosis:
-        """The result, in terms of the records that were given."""
+        """The result, in terms of the records that were given; a motion behind its torque is explained where the model does."""
         given = in_terms_of_the_log(result, self.given)
-        return replace(given, notes=(*self.notes, *result.notes), log_shifts=self.shifts)
+        notes = [_accounted(*self.behind[note], result) or note if note in self.behind else note for note in self.notes]
+        return replace(given, notes=(*notes, *result.notes), log_shifts=self.shifts)
 
 
-def aligned(records: Sequence[Record], validation: Sequence[Record], controller: PI | None, follows: bool = False) -> Aligned:
+def aligned(
+    records: Sequence[Record], validation: Sequence[Record], controller: PI | None, follows: bool = False, refuted: bool = False
+) -> Aligned:
     """The records without shifts of their logs, those that the controller's law shows beyond doubt.
 
     follows: a controller that is no bare PI makes the logged torques, so that these are on the lines of what it read.
+    refuted: a controller is given that does not make them.
     """
     notes: dict[Text, None] = dict.fromkeys(reading_notes((*records, *validation)))
     shifts: dict[str, Mapping[str, int]] = {}
     given: dict[str, Record] = {}
+    behind: dict[Text, tuple[str, TorqueLag, float]] = {}
 
     def one(rec: Record) -> Record:
         moves, note = _of_law(rec, controller)
-        if controller is None and not follows:
-            moves, note = _of_motion(rec)
+        lag = torque_lag(rec) if controller is None and not follows else None
+        if lag is not None:
+            moves, note = _of_motion(lag, refuted)
         if note:
             name = f"{rec.name}: " if len(records) + len(validation) > 1 and rec.name else ""
-            notes[joined("", (name, note))] = None
+            note = joined("", (name, note))
+            notes[note] = None
+            if lag is not None and lag.lag < 0.0:
+                behind[note] = name, lag, rec.dt
         moved = rec.shifted(**moves) if moves else rec
         if moves:
             shifts[rec.digest] = moves
         given[moved.digest] = rec
         return moved
 
-    return Aligned(tuple(map(one, records)), tuple(map(one, validation)), tuple(notes), shifts, given)
+    return Aligned(tuple(map(one, records)), tuple(map(one, validation)), tuple(notes), shifts, given, behind)
 
 
 def _of_law(rec: Record, controller: PI | None) -> tuple[Mapping[str, int], Text]:
@@ -197,15 +214,14 @@ def _measured_note(b: int, lag: TorqueLag | None) -> Text:
     return say(text, _samples(b), where, f"shift torque={-b}")
 
 
-def _of_motion(rec: Record) -> tuple[Mapping[str, int], Text]:
+def _of_motion(lag: TorqueLag, refuted: bool) -> tuple[Mapping[str, int], Text]:
     """(channel -> samples by which it is moved, note) of a torque in open loop, where no law of a controller proves anything.
 
     A motion that comes whole samples before its torque is the log's: no axis does that, and there is nothing to find in it.
     By a part of a sample it is a filter of the torque, or a torque that goes on between the lines; a motion behind its torque
     may be a delay of the drive. Neither is moved.
     """
-    lag = torque_lag(rec)
-    if lag is None or abs(lag.lag) - POLICY.contradiction * lag.std < POLICY.lag_seen or abs(lag.lag) < POLICY.lag_said:
+    if not _said(lag):
         return {}, Text("")
     whole = round(lag.lag)
     apart = abs(lag.lag - whole)
@@ -225,6 +241,31 @@ def _of_motion(rec: Record) -> tuple[Mapping[str, int], Text]:
     else:
         text = (
             "The motion follows the logged {torque} by {} more than an axis needs: a delay of the drive or of the velocity's "
-            "sensor, or a log that wrote the {torque} early; without a controller the data cannot tell; {}"
+            "sensor, or a log that wrote the {torque} early; {} the data cannot tell; {}"
         )
+        return {}, say(text, _samples(lag.lag), REFUTED if refuted else "without a controller", remedy)
     return {}, say(text, _samples(lag.lag), remedy)
+
+
+def _said(lag: TorqueLag) -> bool:
+    """Whether a lag is so large, beyond its deviation, that it is said."""
+    return abs(lag.lag) - POLICY.contradiction * lag.std >= POLICY.lag_seen and abs(lag.lag) >= POLICY.lag_said
+
+
+def _accounted(name: str, lag: TorqueLag, dt: float, result: Diagnosis) -> Text | None:
+    """What is said of a motion behind its torque where a model has what makes it late; None where it has not.
+
+    Where what is left would not be said of a record by itself, nothing is left to explain.
+    """
+    late = {e.name: LINEAR[e.name](e.values).late / dt for e in result.model.effects if e.name in LINEAR}
+    parts = [say("the {}", called(effect)) for effect, lines in late.items() if lines > 0.0]
+    if result.velocity_age > 0.0:
+        parts.append(Text("the age of the velocity"))
+    made = sum(late.values()) + max(result.velocity_age, 0.0)
+    if not parts or _said(replace(lag, lag=lag.lag + made)):
+        return None
+    text = (
+        "{}The motion follows the logged {torque} by {} more than an axis needs. The model has what makes that: {}, {} together. "
+        "A log that wrote the {torque} early would look the same."
+    )
+    return say(text, name, _samples(lag.lag), joined(" and ", parts), _samples(made))

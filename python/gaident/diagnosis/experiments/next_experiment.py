@@ -8,6 +8,7 @@ parameters included, as the diagnosis would fit it:
 v whitened by the noise filter of the diagnosed record, V and N of its final fit.
 A pair's T is the smaller one of both directions, because it is not known which effect is true.
 Where B contains A only B is simulated, because it can follow any motion of A. The command's T is that of its worst pair.
+Of effects that act alike on every record one is tried for all: what tells it from A tells them too, and nothing tells them apart.
 Without the fit of the rival every experiment would look good (T-optimal design, Atkinson and Fedorov).
 
 A loop that a position drives gets the path that a command makes.
@@ -135,6 +136,7 @@ def propose(
     rivals: effect -> (its gain, the explanations in its place); final: the diagnosed model; count: samples behind its cost;
     elsewhere: effects at the controller, effect -> parameter -> value.
     """
+    possible = {name for f in findings for name in (f.effect, *f.alternatives)}
     notes = [e.otherwise for e in EQUIVALENT if any(e.effects <= {f.effect, *f.alternatives} for f in findings)]
     pairs = [
         (effect, rival)
@@ -143,10 +145,10 @@ def propose(
         for rival in rivals[effect][1]
         if name_of(rival.effect) not in (f.effect, *equivalents(f.effect))
     ]
-    pairs = sorted(pairs, key=lambda p: p[1].behind)[: POLICY.starts]
+    pairs = _one_of_each_class(sorted(pairs, key=lambda p: p[1].behind))[: POLICY.starts]
     if not pairs:
         return None, notes
-    names = tuple(dict.fromkeys(name_of(e) for effect, rival in pairs for e in (effect, rival.effect)))
+    names = _named(pairs)
     controller = data.controller
     if controller is None or (data.pi is not None and data.command is None):
         text = (
@@ -168,7 +170,7 @@ def propose(
     table = [row for row in table if id(row[0]) not in too_little]
     pairs = [pair for pair in pairs if id(pair) not in too_little]
     if pairs:
-        names = tuple(dict.fromkeys(name_of(e) for effect, rival in pairs for e in (effect, rival.effect)))
+        names = _named(pairs)
     trials = [trial for _, trial, _ in table]
     rough = np.min([T for *_, T in table], axis=0) if table and items else np.zeros(0)
     best, most = None, -1.0
@@ -184,7 +186,27 @@ def propose(
         text = "No experiment of the menu within the limits of these records tells {} apart."
         return None, [*notes, say(text, _listed(names))]
     n = len(best.command)
-    return best.proposal(names, float(n * np.log1p(most / n))), notes
+    alike = {name: tuple(e for e in equivalents(name) if e in possible) for name in names}
+    alike = {name: others for name, others in alike.items() if others}
+    return replace(best.proposal(names, float(n * np.log1p(most / n))), alike=alike), notes
+
+
+def _named(pairs: Sequence[tuple[str, Replacement]]) -> tuple[str, ...]:
+    """The effects of all pairs, of those that act alike on every record the first."""
+    names: dict[str, None] = {}
+    for name in (name_of(e) for effect, rival in pairs for e in (effect, rival.effect)):
+        if not any(other in names for other in equivalents(name)):
+            names[name] = None
+    return tuple(names)
+
+
+def _one_of_each_class(pairs: Sequence[tuple[str, Replacement]]) -> list[tuple[str, Replacement]]:
+    """The pairs without those whose rival acts as that of a pair before does on every record."""
+    kept: dict[tuple[str, frozenset[str]], tuple[str, Replacement]] = {}
+    for effect, rival in pairs:
+        name = name_of(rival.effect)
+        kept.setdefault((effect, frozenset({name, *equivalents(name)})), (effect, rival))
+    return list(kept.values())
 
 
 def at_rest(fit: Fit, data: DataSet) -> tuple[Hypothesis, Vector]:

@@ -18,6 +18,7 @@ from gaident.policy.table import POLICY
 from gaident.results.estimate import Estimate
 
 __all__ = [
+    "ON_A_SPRING",
     "basis_of",
     "closer_numbers",
     "closest",
@@ -31,6 +32,9 @@ __all__ = [
     "period_seen",
     "torque_unlogged",
 ]
+
+
+ON_A_SPRING = Text("The axis is on a spring to the ground: its tension where the record starts is part of the constant load.")
 
 
 def evidence_of(
@@ -54,8 +58,11 @@ def evidence_of(
     return say("{}: {} {}.", what, sure, worse)
 
 
-def basis_of(found: Selection) -> list[Text]:
-    """Which errors the parameters rest on, where these are not whitened ones or the specification test speaks against them."""
+def basis_of(found: Selection, left: bool) -> list[Text]:
+    """Which errors the parameters rest on, where these are not whitened ones or the specification test speaks against them.
+
+    left: whether something significant depends on a signal, as the verdict says.
+    """
     test = found.specification
     if test is None:  # a measured torque, as the user says
         return []
@@ -70,7 +77,8 @@ def basis_of(found: Selection) -> list[Text]:
         return []
     before = found.whitened
     if before is not None and not before.space.is_noise(before.final):
-        return [Text("What the model leaves is more than noise: the parameters are those of least output error.")]
+        depends = "" if left else ", but depends on no signal of these records beyond chance"
+        return [Text(f"What the model leaves is more than noise{depends}: the parameters are those of least output error.")]
     return [Text("A noise model would take a cause for noise here: the parameters are those of least output error.")]
 
 
@@ -125,9 +133,13 @@ def _swings_up(mechanics: Mapping[str, Estimate]) -> list[Text]:
     return [say(text, pair, e.value) for pair, e in found if e is not None and e.value < -POLICY.contradiction * e.std]
 
 
-def of_the_mechanics(mechanics: Mapping[str, Estimate]) -> list[Text]:
-    """Notes on what was estimated of the mechanism."""
-    return _swings_up(mechanics) + _of_the_controller(mechanics)
+def of_the_mechanics(mechanics: Mapping[str, Estimate], ages: Mapping[str, float], data: DataSet, left_open: bool) -> list[Text]:
+    """Notes on what was estimated of the mechanism.
+
+    ages: name -> the part of its deviation that the age of the velocity makes; left_open: whether the controller was given with
+    numbers that are not known.
+    """
+    return _swings_up(mechanics) + _of_the_controller(mechanics, ages, data, left_open)
 
 
 def torque_unlogged(data: DataSet) -> list[Text]:
@@ -184,12 +196,36 @@ def closer_numbers(torque: FoundNumbers, model: FoundNumbers) -> Text:
     return say(text, float(np.abs(model.deviations_off).max(initial=0.0)))
 
 
-def _of_the_controller(mechanics: Mapping[str, Estimate]) -> list[Text]:
-    """What is said where most of the deviations of the mechanics comes from numbers of the controller that were found."""
+def _of_the_controller(
+    mechanics: Mapping[str, Estimate], ages: Mapping[str, float], data: DataSet, left_open: bool
+) -> list[Text]:
+    """What is said where most of the deviations of the mechanics comes from what the records had to show beside them.
+
+    That is numbers of the controller, or how old the velocity is against the torque.
+    """
     # no decision: a formula: more than half of a variance
     mostly = [name for name, e in mechanics.items() if 2.0 * e.of_controller**2 > e.std**2 > 0.0]
-    text = (
-        "Most of the deviation of {} comes from the numbers, or the clock, of the controller, which the records had to show: "
-        "give them, or log every one of its samples."
+    # no decision: a formula: more than half of a variance
+    by_age = [name for name in mostly if 2.0 * ages.get(name, 0.0) ** 2 > mechanics[name].of_controller ** 2]
+    by_numbers = [name for name in mostly if name not in by_age]
+    numbers = (
+        "the numbers of the controller that were left open: give them."
+        if left_open
+        else "the numbers of the controller, which as given do not fit these records and were estimated: give those of the drive."
     )
-    return [say(text, joined(", ", (Text(name.replace("_", " ")) for name in mostly)))] if mostly else []
+    age = say("the age of the velocity against the {torque}, which these records do not show: {}.", _shows_the_age(data))
+    text = "Most of the deviation of {} comes from {}"
+    return [
+        say(text, joined(", ", (Text(name.replace("_", " ")) for name in names)), why)
+        for names, why in ((by_numbers, numbers), (by_age, age))
+        if names
+    ]
+
+
+def _shows_the_age(data: DataSet) -> Text:
+    """What to give or to log, so that the age of the velocity is known."""
+    if data.controller is not None and not data.clocked:
+        return Text("give the period of the controller, or log every one of its samples")
+    if not data.known_between:
+        return say("give the controller that makes this {torque}, or log every one of its samples")
+    return say("log the encoder's {angle} too, at every sample of the controller")

@@ -11,7 +11,7 @@ from gaident.diagnosis.library import triggers as t
 from gaident.diagnosis.library.cause import AT_THE_SHAFT, NO_REVERSAL, Cause
 from gaident.diagnosis.library.coordinates import HIGHEST_ORDER, grid, ln, of, positive
 from gaident.diagnosis.library.kinds import FREE, linear
-from gaident.estimation.term import Rows, Scales
+from gaident.estimation.term import PHASE, Rows, Scales
 
 __all__ = ["CAUSES"]
 
@@ -244,6 +244,7 @@ CAUSES: tuple[Cause, ...] = (
         family=FRICTION,
         harmonic="friction",
         components=1,
+        scales={"phase": PHASE},
         orders=(1, HIGHEST_ORDER),
         levels=True,
         domains=AT_THE_SHAFT,

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from gaident.diagnosis.library.cause import Cause
 from gaident.diagnosis.library.coordinates import positive
-from gaident.estimation.term import Rows, Scales
+from gaident.estimation.term import PHASE, Rows, Scales
 
 __all__ = ["FREE", "harmonic", "linear", "single"]
 
@@ -87,4 +87,5 @@ def harmonic(effect: str, place: str, first: int, with_order: bool, kind: str, *
         order = 0.05 / s.travel if s.period_seen else 0.0  # no decision: the step of a difference; rad over the travel
         return (a, a, order)[: 3 if with_order else 2]
 
-    return Cause(effect, place, natural, coordinates, limits, lambda s: [], steps, harmonic=kind, **known)
+    turning = {"phase": PHASE}
+    return Cause(effect, place, natural, coordinates, limits, lambda s: [], steps, harmonic=kind, scales=turning, **known)

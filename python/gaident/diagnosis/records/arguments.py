@@ -14,7 +14,7 @@ from gaident.errors import RecordError, SettingsError
 from gaident.policy.table import POLICY
 from gaident.results.identification import Identification
 
-__all__ = ["ProgressCallback", "accuracy_of", "checked", "in_order", "noise_std_of", "records_of"]
+__all__ = ["ProgressCallback", "accuracy_of", "checked", "expected_of", "in_order", "noise_std_of", "records_of"]
 
 ProgressCallback = Callable[[float, str], None]
 
@@ -78,6 +78,25 @@ def accuracy_of(accuracy: float | Mapping[str, float] | None) -> dict[str, float
         if isinstance(value, bool) or not isinstance(value, (int, float)) or not 0.0 < float(value) < float("inf"):
             raise SettingsError(f"accuracy of the {name} is {value!r}: give a number above 0, in rad/s or N m")
     return {name: float(value) for name, value in given.items()}
+
+
+def expected_of(expected: Mapping[str, tuple[float, float]] | None) -> dict[str, tuple[float, float]]:
+    """Name -> (lowest, highest) of what is expected of the mechanism."""
+    remedy = "give a mapping with inertia, resonance_hz or damping, each a pair (lowest, highest)"
+    if expected is not None and not isinstance(expected, Mapping):
+        raise SettingsError(f"expected is {expected!r}: {remedy}")
+    found = {}
+    for name, value in (expected or {}).items():
+        if name not in ("inertia", "resonance_hz", "damping"):
+            raise SettingsError(f"expected has {name!r}: {remedy}")
+        try:
+            low, high = (float(v) for v in value)
+        except (TypeError, ValueError):
+            raise SettingsError(f"expected {name} is {value!r}: {remedy}") from None
+        if not 0.0 <= low < high:
+            raise SettingsError(f"expected {name} is {value!r}: {remedy}, with 0 <= lowest < highest")
+        found[name] = low, high
+    return found
 
 
 def in_order(records: tuple[Record, ...]) -> tuple[Record, ...]:

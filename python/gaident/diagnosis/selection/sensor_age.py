@@ -99,8 +99,9 @@ def searched(
         )
         older = Objective(data.aged(HALF), objective.weight, counter=objective.counter)
         return search(older, most, None), [say(text, 1e3 * HALF * data.dt)]
-    # Between the lines of a log whose torque does not follow from its controller, the torque may go on.
-    going_on = (-HALF,) if every == 1 and controller is not None and data.torque_logged and not data.loop_follows else ()
+    # Between the lines of a log whose torque does not follow from its controller, the torque may go on; not where
+    # that was given a sample time, and the log has a line for each of its samples.
+    going_on = (-HALF,) if every == 1 and controller is not None and data.torque_logged and not data.known_between else ()
     if going_on:
         objective = Objective(data.aged(0.0, going_on), objective.weight, counter=objective.counter)
     read = data.velocity[objective.weight > 0.0]  # what stands in an outlier's place is on no lattice
