@@ -831,10 +831,19 @@ def test_where_impacts_leave_more_than_noise_the_others_are_rivals(monkeypatch: 
     assert other.bic > gap.bic + 10.0 * bench.space.margin, "far behind"
     space = type(bench.space)
     monkeypatch.setattr(space, "add", lambda self, fit: [other])
+    monkeypatch.setattr(space, "instead", lambda self, fit, term: [other])
+    monkeypatch.setattr(space, "is_noise", lambda self, fit: True)
     monkeypatch.setattr(space, "deepened", lambda self, fit: fit)
     for noise in (True, False):
-        monkeypatch.setattr(space, "is_noise", lambda self, fit, noise=noise: noise)
+        monkeypatch.setattr(space, "small_unwhitened", lambda self, fit, noise=noise: noise)
         assert [r.effect for r in rivals_of(bench.space, gap, "gap")[1]] == ([] if noise else ["b"])
+
+
+def test_another_effect_with_impacts_is_searched_in_the_place_of_one() -> None:
+    other = replace(VALLEY, place="coupling")
+    bench = Bench({"valley": (0.52,)}, masses=2, allowed=(IMPACTS, other, A))
+    (found,) = bench.space.instead(bench.fit(IMPACTS, A), IMPACTS)
+    assert found.effects == ("a", "valley") and found.x[-1] == pytest.approx(0.52, abs=2e-3)
 
 
 def test_demoted_takes_a_linear_model_too() -> None:

@@ -74,6 +74,19 @@ class Repeated(SideMoves):
         best = min(tries, key=lambda f: f.bic)
         return self.refitted(best.hypothesis, best.x)
 
+    def instead(self, fit: Fit, term: Term) -> list[Fit]:
+        """Each other effect with impacts in the place of one, from its best start beside this mechanism, searched globally."""
+        short, x = fit.hypothesis.without(term.name), fit.parameters.removed(fit.x, term.name)
+        found = []
+        for other in (t for t in self.allowed if t.impacts and t.name not in fit.effects):
+            longer, rows = short.extended(other), other.starts(fit.parameters.scales)
+            if not rows:
+                continue
+            X = np.array([short.parameters.inserted(x, np.array(row)) for row in rows])
+            start = X[int(np.argmin(self.objective.costs(longer, X, WHITE)))]
+            found.append(self.evolved(ls.scored(self.objective, ls.fit(self.objective, longer, start, WHITE, self.policy.short))))
+        return found
+
     def searched_alike(self, now: Fit, fits: Sequence[Fit]) -> list[Fit]:
         """Models that a model grew to: all with impacts are searched where one of these leads, as local fits tell nothing."""
         if now.impacts or not (lead := min(fits, key=self.score)).impacts or self.quiet(lead):

@@ -35,7 +35,13 @@ def rivals_of(space: Moves, final: Fit, effect: str, equivalent: Collection[str]
     found = []
     turned = space.at_other_side(final, term)
     elsewhere = None if turned is None else turned.parameters.terms[-1].name
-    for f in space.add(less):
+    # Where a model with impacts leaves more than noise, the search has missed its minimum, or that of another one.
+    missed = term.impacts and not (space.is_noise(final) and space.small_unwhitened(final))
+    others = space.add(less)
+    if missed:
+        others = [*(f for f in others if not f.parameters.terms[-1].impacts), *space.instead(final, term)]
+        others = sorted(others, key=space.score)
+    for f in others:
         new = [t for t in f.parameters.terms if t.name not in final.effects]
         if len(new) != 1 or len(f.effects) != len(final.effects):
             continue
@@ -58,9 +64,7 @@ def rivals_of(space: Moves, final: Fit, effect: str, equivalent: Collection[str]
                 continue
             if not space.beyond_simulation(final, f) or (behind < -space.penalty and not space.in_both_loops(final, f)):
                 continue
-        # Where a model with impacts leaves more than noise, the search has missed its minimum, or that of another one.
-        missed = term.impacts and other.impacts and not space.is_noise(final)
-        if behind < space.margin or missed:
+        if behind < space.margin or (missed and other.impacts):
             found.append(Replacement(other.name, behind, f))
     if turned is not None and elsewhere is not None and turned.bic - final.bic < space.margin:
         there = Replacement(elsewhere, turned.bic - final.bic, turned)
