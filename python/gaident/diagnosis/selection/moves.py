@@ -12,7 +12,9 @@ A model is a mechanism (one mass or two) with effects. The moves are
     ground      one mass on a spring to the ground
     demote      two masses to one, or the spring away
     close       the open loop to the closed one
-    search      the same model again, from all starts and globally, beside stops and impacts
+    search      the same model again, from all starts, globally beside stops and impacts, under the best predictor
+    alike       all models with impacts that were grown, searched globally where one of them leads
+    instead     another effect with impacts in the place of one, searched globally
     elsewhere   two masses with the same effects, with another resonance
 
 Whether an effect is added is one decision, `ModelSpace.worth`; a search of the same model compares its BIC alone.

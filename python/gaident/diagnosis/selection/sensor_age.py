@@ -11,7 +11,8 @@ A search without it fits it as a delay or, beside a current loop, as a resonance
   Where they are a whole number, or a power of two as far as the decimals of a log show, the velocity may be a difference.
   Not every velocity on such a lattice is one: an observer or the drive's firmware may round to it.
   So both ages are fitted, with the linear mechanism alone and with the lag of a current loop.
-  The velocity is no difference where the age of 0 scores better by more than the margin of two rivals.
+  The velocity is no difference where the age of 0 scores better by more than the margin of two rivals, and so does the model that
+  the search finds with it.
 - On another lattice (a gear, a scale, a unit between) the velocity may be a difference.
   Where the search finds a delay, a lag or a resonance in series with the mechanism, it is made again with the age of half
   a sample, which is no effect and costs nothing.
@@ -122,11 +123,13 @@ def searched(
     if not step > 0.0:
         return found, []
     # First whether fewer effects may do, unless the model itself is better so; then what the whole search ends with.
-    closest, better = _over_older(found, older)
+    # Velocities of an encoder's whole lines are a difference unless the model speaks against it, others if it speaks for it.
+    margin = -POLICY.rival_margin if lines else POLICY.rival_margin
+    closest, better = _over_older(found, older, margin)
     limits = (most,) if better else (len(found.final.effects) - 1, most)
     for allowed in limits:
         again = search(older, allowed, closest if len(closest.effects) <= allowed else None)
-        if not _better(again, found):
+        if not _better(again, found, margin):
             return found, []
     return again, [_on_a_lattice(step, age)]
 
@@ -139,15 +142,15 @@ def _on_a_lattice(step: float, age: float) -> Text:
     return say(text, step, age)
 
 
-def _better(again: Selection, found: Selection) -> bool:
+def _better(again: Selection, found: Selection, margin: float) -> bool:
     """Whether the model of a search under older velocities takes the place: with fewer effects, or with as many by the margin."""
     more = len(again.final.effects) - len(found.final.effects)
-    margin = POLICY.rival_margin if more == 0 else 0.0
+    margin = margin if more == 0 else min(margin, 0.0)
     return more <= 0 and _score_beside(again, found) < found.space.score(found.final) - margin
 
 
-def _over_older(found: Selection, older: Objective) -> tuple[Fit, bool]:
-    """(the model that was found, fitted to the older velocities; whether it is better there by the margin of two rivals).
+def _over_older(found: Selection, older: Objective, margin: float) -> tuple[Fit, bool]:
+    """(the model that was found, fitted to the older velocities; whether it is better there by this margin [BIC units]).
 
     As it is, without one of its lags and delays, or with another one in the place of that, whichever scores best.
     """
@@ -164,7 +167,7 @@ def _over_older(found: Selection, older: Objective) -> tuple[Fit, bool]:
                 tries.append(replace(final, hypothesis=longer, x=short.parameters.inserted(x, z)))
     space = replace(space, objective=replace(space.objective, data=older.data))
     closest = min((_fitted_to(older.data, f, space) for f in tries), key=space.score)
-    return closest, space.score(closest) < found.space.score(final) - POLICY.rival_margin
+    return closest, space.score(closest) < found.space.score(final) - margin
 
 
 def _parted(fit: Fit, term: Term) -> tuple[Vector, Vector]:
