@@ -67,7 +67,8 @@ def test_a_loop_that_is_not_the_drives_is_not_simulated() -> None:
     dia = ga.diagnose(log(), TWO_WRONG)
     assert not dia.loop_follows
     assert any("So no loop is closed over this controller" in note for note in dia.notes)
-    assert "the logged torque drives these models, no loop is closed" in " ".join(dia.summary().split())
+    told = " ".join(dia.summary().split())
+    assert "does not follow from this controller (see above): it drives these models, no loop is closed" in told
     friction = next(cause for cause in dia.causes if cause.effect == "coulomb_friction")
     assert friction.parameters["torque"].value == pytest.approx(0.05, rel=0.01)
     assert dia.mechanics["inertia"].value == pytest.approx(4e-4, rel=0.01)
