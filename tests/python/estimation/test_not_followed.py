@@ -120,8 +120,10 @@ class Searches:
     older: dict[int, tuple[int, float]]
     asked: list[tuple[bool, int]] = field(default_factory=list)
     ages: list[tuple[float, tuple[float, ...]]] = field(default_factory=list)
+    beside: list[Any] = field(default_factory=list)
 
-    def __call__(self, objective: Objective, most: int) -> Any:
+    def __call__(self, objective: Objective, most: int, beside: Any) -> Any:
+        self.beside.append(beside)
         aged = objective.data.age > 0.0
         self.asked.append((aged, most))
         self.ages.append((objective.data.age, objective.data.other_ages))
@@ -136,7 +138,8 @@ def test_a_search_with_an_encoders_age_is_made_whole_only_where_fewer_effects_ma
     monkeypatch.setattr(sensor_age, "encoder_step", lambda velocity, linear: 0.01)
     monkeypatch.setattr(sensor_age, "encoder_lines", lambda velocity, dt, turn: 0)
     monkeypatch.setattr(sensor_age, "_score_beside", lambda again, found: again.final.score)
-    monkeypatch.setattr(sensor_age, "_better_if_older", lambda found, older: False)
+    closest = SimpleNamespace(effects=("lag",))
+    monkeypatch.setattr(sensor_age, "_over_older", lambda found, older, margin: (closest, False))
     model, scales = ga.OneMass(J=3e-4, D=2e-3).model(), scales_of(objective.data)
     for older, whole, taken in (
         ({0: (0, 5.0)}, False, False),  # worse without effects: no whole search
@@ -146,15 +149,23 @@ def test_a_search_with_an_encoders_age_is_made_whole_only_where_fewer_effects_ma
         search = Searches((1, 0.0), older)
         found, notes = sensor_age.searched(objective, scales, model, search)
         assert search.asked == [(False, 4), (True, 0), *[(True, 4)] * whole]
+        assert search.beside == [None, None, *[closest] * whole], "the model that was found has more effects than none"
         assert bool(notes) is taken and len(found.final.effects) == (0 if taken else 1)
-    monkeypatch.setattr(sensor_age, "_better_if_older", lambda found, older: True)
+    monkeypatch.setattr(sensor_age, "_over_older", lambda found, older, margin: (closest, True))
     margin = POLICY.rival_margin
-    for effects, score, taken in (
-        (1, -1.1 * margin, True),
-        (1, -0.9 * margin, False),
-        (0, -1.0, True),
-        (2, -99.0 * margin, False),
+    for whole_lines, effects, score, taken in (
+        (0, 1, -1.1 * margin, True),
+        (0, 1, -0.9 * margin, False),
+        (0, 0, -1.0, True),
+        (0, 2, -99.0 * margin, False),
+        (4096, 1, 0.9 * margin, True),  # an encoder's lines: the model has to speak against the age
+        (4096, 1, 1.1 * margin, False),
+        (4096, 0, 0.9 * margin, True),
+        (4096, 2, -99.0 * margin, False),
     ):
+        monkeypatch.setattr(sensor_age, "encoder_lines", lambda velocity, dt, turn, lines=whole_lines: lines)
+        # The linear mechanism speaks against the age, so that both searches are made.
+        monkeypatch.setattr(sensor_age, "_score", lambda objective, scales, model: 99.0 * margin * (objective.data.age > 0.0))
         search = Searches((1, 0.0), {4: (effects, score)})
         found, notes = sensor_age.searched(objective, scales, model, search)
         assert search.asked == [(False, 4), (True, 4)] and bool(notes) is taken
@@ -172,7 +183,7 @@ def test_a_logged_torque_that_does_not_follow_from_its_controller_may_go_on_betw
     data = replace(data, read=read, controller=period, loop_follows=follows)
     for name, found in (
         ("_ahead", None),
-        ("_better_if_older", False),
+        ("_over_older", (SimpleNamespace(effects=("lag",)), False)),
         ("encoder_lines", 0),
         ("encoder_step", 0.01),
         ("_score_beside", 9.0),
