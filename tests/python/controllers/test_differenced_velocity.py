@@ -13,7 +13,7 @@ import pytest
 from test_servo import CASES, KI, KP, T
 
 import gaident as ga
-from drive_rig import Array, Noise, Plant, rig, skip_without_library
+from drive_rig import Array, Noise, Plant, rig, run_drive, skip_without_library
 from gaident.control.differencing import differencing
 from gaident.diagnosis.gains import closed_over
 from gaident.identification.replay.replay import replay
@@ -141,3 +141,31 @@ def test_free_runs_are_closed_over_what_the_torque_does_not_tell() -> None:
     assert closed_over(other, [log]) is None and closed_over(other, [log], ["coulomb_friction"]) is None
     assert closed_over(other, [log], ["backlash"]) is other and closed_over(other, [moving], ["backlash"]) is None
     assert closed_over(faster, [log]) is faster and closed_over(faster, [moving]) is None
+
+
+@pytest.mark.parametrize("seed", [0, 2])
+def test_friction_and_gravity_do_not_hide_the_age_nor_what_kind_of_lag_there_is(seed: int) -> None:
+    """Seed 0 had a Stribeck friction and seed 2 a transport delay on a second mass for the lag of a current loop."""
+    loop = ga.Cascade(ga.PI(0.45, 18.0, rule="backward"), 250e-6)
+    axis = Plant(J=4.5e-3, D=3e-3, kp=0.45, ki=18.0, dt=250e-6, cascade=loop, name="axis")
+    levels, command = np.repeat(np.random.default_rng(seed).uniform(-100, 100, 8), 900), np.zeros(7200)
+    for n in range(1, len(command)):
+        command[n] = command[n - 1] + np.clip(levels[n] - command[n - 1], -0.5, 0.5)
+    truth = {
+        "unbalance": {"amplitude": 0.6, "phase": 0.4},
+        "coulomb_friction": {"torque": 0.2},
+        "torque_lag": {"time_constant": 3e-4},
+    }
+    log = run_drive(axis, command, truth, encoder=2 * np.pi / 2**20, differenced=True)
+    rec = ga.Record(250e-6, command=np.round(command, 4), velocity=log.velocity, torque=np.round(log.torque, 4))
+    dia = ga.diagnose(rec, loop)
+    assert dia.verdict == "explained" and dia.velocity_age == 0.5, dia.summary()
+    assert {f.effect: f.alternatives for f in dia.causes} == {
+        "unbalance": (),
+        "coulomb_friction": (),
+        "torque_lag": ("velocity_filter",),
+    }
+    for cause in dia.causes:
+        for name, value in truth[cause.effect].items():
+            assert cause.parameters[name].value == pytest.approx(value, rel=1e-3)
+    assert dia.mechanics["inertia"].value == pytest.approx(4.5e-3, rel=1e-4) and "motor_inertia" not in dia.mechanics

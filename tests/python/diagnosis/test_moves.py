@@ -557,11 +557,21 @@ def test_simplify_takes_a_detail_back_that_is_not_there() -> None:
 def test_demote_makes_one_mass_where_the_second_explains_nothing() -> None:
     """One mass spans the first two base signals: the truth has no more, or all six."""
     for base, back in (((1.0, 1.0, 0.0, 0.0, 0.0, 0.0), True), ((1.0, 1.0, 0.4, 0.4, 0.4, 0.4), False)):
-        bench = Bench({"a": (0.4,)}, masses=2, base=base)
+        bench = Bench({"a": (0.4,)}, masses=2, base=base, allowed=(A,))
         two = bench.fit(A)
         (one,) = bench.space.demote(two)
         assert one.parameters.masses == 1 and one.effects == ("a",)
         assert bench.space.prefers(one, two) is back
+
+
+def test_demote_tries_another_effect_in_series_with_the_one_mass() -> None:
+    """Two masses with the wrong one of two delays are as good as one mass with the right one."""
+    bench = Bench({"b": (0.4,)}, masses=2, base=(1.0, 1.0, 0.0, 0.0, 0.0, 0.0), extra=-0.2 * wave(12.0), allowed=(A, B, LEVEL))
+    shaft = replace(LEVEL, domains=("w",))
+    same, other = replace(bench.space, allowed=(A, B, shaft)).demoted(bench.fit(A))
+    assert same.effects == ("a",) and other.effects == ("b",) and other.parameters.masses == 1
+    assert other.bic < same.bic
+    assert [f.effects for f in replace(bench.space, allowed=(A, B, shaft)).demoted(bench.fit(shaft))] == [("level",)], "no delay"
 
 
 def test_demote_takes_the_spring_away_where_it_explains_nothing() -> None:

@@ -10,7 +10,7 @@ A model is a mechanism (one mass or two) with effects. The moves are
     a load      one mass with effects of its shaft as two masses, these at the load
     own         the mechanism's resonance at the place of an extra one
     ground      one mass on a spring to the ground
-    demote      two masses to one, or the spring away
+    demote      two masses to one, with another delay or lag too, or the spring away
     close       the open loop to the closed one
     search      the same model again, from all starts, globally beside stops and impacts, under the best predictor
     alike       all models with impacts that were grown, searched globally where one of them leads
@@ -297,7 +297,15 @@ class Moves(Repeated):
         if fit.parameters.masses == 1 or any(t.needs_two_masses or t.resonates for t in fit.parameters.terms):
             return []
         hypothesis, x = as_one_mass(fit)
-        return [self.continued(hypothesis, fit, x, self.policy.long)]
+        found = [self.continued(hypothesis, fit, x, self.policy.long)]
+        # A second mass may only have made a delay of a lag, or a lag of a delay.
+        for term in hypothesis.parameters.terms:
+            for other in (t for t in self.allowed if t.in_series and term.in_series and t.size == term.size):
+                if other.name not in fit.effects:
+                    short, rest = hypothesis.without(term.name), hypothesis.parameters.removed(x, term.name)
+                    y = short.parameters.inserted(rest, x[hypothesis.parameters.slot(term.name)])
+                    found.append(self.refitted(short.extended(other), y, self.policy.long))
+        return found
 
     def close(self, fit: Fit) -> list[Fit]:
         """A model with dry friction in closed loop, whose controller keeps the simulation near the record between its stops.
