@@ -163,14 +163,14 @@ def _of_the_filter(model: Model, filtered: FilteredRecords) -> float:
     The torques drive it, so that one that falls another way is no measure.
     """
     made = []
-    for rec in filtered.records:
-        with np.errstate(over="ignore", invalid="ignore"):
-            done = run(model, rec, None, start_state(model, rec, None))
-        if not np.std(done.velocity - rec.velocity) < np.std(rec.velocity):
-            return 0.0
-        made.append(rec.with_channels(velocity=done.velocity, position=None if rec.position is None else done.position))
-    own = replace(filtered, records=tuple(made))
     try:
+        for rec in filtered.records:
+            with np.errstate(over="ignore", invalid="ignore"):
+                done = run(model, rec, None, start_state(model, rec, None))
+            if not np.std(done.velocity - rec.velocity) < np.std(rec.velocity):
+                return 0.0
+            made.append(rec.with_channels(velocity=done.velocity, position=None if rec.position is None else done.position))
+        own = replace(filtered, records=tuple(made))
         return own.force_error(model, own.torques(model)).rms
     except GaidentError:
         return 0.0

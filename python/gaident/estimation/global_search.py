@@ -4,6 +4,7 @@ Two masses, K (s^2 + f1 s + f0)/((s + a)(s^2 + e1 s + e0)), are searched in coor
 
     ln J, a, ln zeta_p, ln e0, ln zeta_z, ln(f0/e0),   J = e0/(K f0), e1 = 2 zeta_p sqrt(e0), f1 = 2 zeta_z sqrt(f0)
 
+A damping that is less than `LEAST_DAMPING`, or negative, is taken for that: the search begins beside such a fit.
 The inertia J of both masses is known closely from the slow motion, whatever the shaft does.
 In K, e and f it is a product: a box around these is nearly all of another inertia.
 """
@@ -34,7 +35,6 @@ STEPS, STEPS_IMPACTS = 0.7, 5.0  # no decision: a start; the same of an effect, 
 SHAFT = np.array([0.05, 1.0, 1.6, 1.0, 1.6, 0.5])  # no decision: a start; the same of two masses, in the coordinates above
 LEAST_DAMPING = 5e-3  # no decision: a start; the damping ratio from which one is searched that is less, or negative
 NEAREST = 0.1  # no decision: a start; the share of the reach within which the nearest members are drawn
-BELOW = -0.02  # no decision: a formula: the antiresonance of a shaft is below its resonance
 
 
 def evolved(objective: Objective, found: Fit, generations: int, draw: int = 0) -> Fit:
@@ -54,8 +54,8 @@ def evolved(objective: Objective, found: Fit, generations: int, draw: int = 0) -
     low, high = at - reach, at + reach
     own = slice(parameters.base, None)  # effects and start states stand in either vector alike
     low[own], high[own] = np.maximum(low[own], limits[0][own]), np.minimum(high[own], limits[1][own])
-    if _on_a_shaft(parameters, found.x):
-        high[5] = min(high[5], BELOW)  # no decision: a formula: the place of ln(f0/e0)
+    if _on_a_shaft(parameters, found.x) and at[5] < 0.0:  # no decision: a formula: the place of ln(f0/e0), below 0 on a shaft
+        high[5] = min(high[5], 0.0)  # no decision: the same
     moved = np.flatnonzero(reach > 0.0)
     if np.any(low[moved] >= high[moved]):
         return found
@@ -93,7 +93,7 @@ def _reach(parameters: Parameterisation, x: Vector) -> Vector:
 
 
 def _on_a_shaft(parameters: Parameterisation, x: Vector) -> bool:
-    """Whether x is of two masses with a resonance and an antiresonance."""
+    """Whether x is of two masses with e0 and f0 above 0."""
     return parameters.masses == 2 and bool(
         np.all(parameters.base_values(x[None, :])[0, [3, 5]] > 0.0)
     )  # no decision: a formula: e0, f0

@@ -25,6 +25,10 @@ Rows = list[tuple[float, ...]]
 PHASE = 1.0  # no decision: a formula: rad; by so much a phase is off where its two components are off by the amplitude
 
 
+IN_SERIES = ("actuator", "sensor", "plant")
+"""Places between the torque and the measured velocity, one behind the other."""
+
+
 @dataclass(frozen=True)
 class Scales:
     """The sizes that bounds and starts are made of, from the records and the model so far."""
@@ -135,7 +139,7 @@ class Term:
     @property
     def in_series(self) -> bool:
         """Whether it is linear: a delay, a lag, a filter or a resonance between the torque and the measured velocity."""
-        return not (self.domains or self.harmonic or self.in_controller)
+        return self.place in IN_SERIES and not (self.domains or self.harmonic)
 
     @property
     def turns_with_the_shaft(self) -> bool:

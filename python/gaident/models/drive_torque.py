@@ -193,7 +193,7 @@ def made_by(rec: Record, controller: Controller) -> Vector:
             f"the record has no torque, and the controller samples {every} times for each of its lines: what it made between "
             f"the lines of the velocity is lost; give {TORQUE}, or log each of its samples. {linear}"
             "Where there is neither, leave the controller's period out: it is then taken for one at the rate of the log. What is "
-            "found is then approximate: an inertia is off by several percent, and a delay may be found that the drive has not"
+            "found is then approximate: an inertia may be off by 15 %, and a delay may be found that the drive has not"
         )
     if not controller.replayable(rec):
         needed = "a command" if controller.driven_by == "command" else "a position_command and a position"

@@ -51,7 +51,9 @@ class Effort:
     regressions: int = effort(50, "regressions", "of a discrete model, each filtered by the noise model of the one before")
     evolution: int = effort(50, "generations", "of a global search beside stops and impacts")
     deepenings: int = effort(12, "searches", "of that kind near the model that was selected, until they gain no more")
-    draws_of_impacts: int = effort(3, "searches", "of that kind from the fit of a model with impacts, when it leads first")
+    draws_of_impacts: int = effort(
+        3, "searches", "of that kind from the fit of a model with impacts, each time that another one leads"
+    )
     draws_in_vain: int = effort(2, "searches", "of these that gain nothing, one after the other, before they end")
     population: int = effort(6, "1", "members of that search for each number that it moves")
 

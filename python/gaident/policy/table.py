@@ -220,7 +220,9 @@ class Decisions:
     replay_steps: float = loop(3.0, "steps", "of the torque's rounding, by which a torque that follows is off at most")
     replay_rms: float = loop(2.0, "steps", "the same for the rms")
     sum_of_roundings: float = loop(3.0, "1", "standard deviations of a sum of roundings, which it exceeds by chance alone")
-    replay_left: float = loop(1e-3, "1", "most that an effect leaves of the replay's squared error where it explains it")
+    replay_left: float = loop(
+        1e-3, "1", "most that an effect leaves of the replay's squared error, and of the torque's, where it explains it"
+    )
     replay_noise: float = loop(0.1, "1", "part of the torque's standard deviation: more is no noise of a measured torque")
     same_gains: float = loop(1e-2, "1", "relative difference of the gains of several logs, up to which they are the same")
     gain_doubt: float = loop(

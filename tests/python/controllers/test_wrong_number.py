@@ -108,16 +108,13 @@ def at_limit(every: int, differenced: bool = True) -> ga.Record:
     return ga.Record(1e-3, command=speed[::every], velocity=np.round(velocity * RPM, 3) / RPM, torque=np.round(torque, 4))
 
 
-TOLD_BY_CHANCE = (
-    "8 and 16 samples to a line differ by 0.03 lines in the lag, which is known to 0.06: about 16 is proposed, not taken"
-)
-
-
-@pytest.mark.parametrize("every", [1, 2, 4, pytest.param(8, marks=pytest.mark.xfail(strict=True, reason=TOLD_BY_CHANCE))])
+@pytest.mark.parametrize("every", [1, 2, 4, 8])
 def test_a_sample_time_is_told_by_the_torque_and_by_the_age_of_the_velocity(every: int) -> None:
     shown = period_shown([at_limit(every)], ga.PI(0.15, 8.0))
     if every == 1:
         assert shown is None
+    elif every == 8:  # 8 and 16 differ by 0.03 lines in the lag, which is known to 0.06: about 16 is proposed, none is taken
+        assert shown is not None and shown.controller == ga.PI(0.15, 8.0) and "about 16 times for each line" in shown.note
     else:
         assert shown is not None and shown.controller == ga.Cascade(ga.PI(0.15, 8.0), 1e-3 / every)
 

@@ -566,12 +566,14 @@ def test_demote_makes_one_mass_where_the_second_explains_nothing() -> None:
 
 def test_demote_tries_another_effect_in_series_with_the_one_mass() -> None:
     """Two masses with the wrong one of two delays are as good as one mass with the right one."""
-    bench = Bench({"b": (0.4,)}, masses=2, base=(1.0, 1.0, 0.0, 0.0, 0.0, 0.0), extra=-0.2 * wave(12.0), allowed=(A, B, LEVEL))
-    shaft = replace(LEVEL, domains=("w",))
-    same, other = replace(bench.space, allowed=(A, B, shaft)).demoted(bench.fit(A))
+    one, two, shaft = replace(A, place="actuator"), replace(B, place="actuator"), LEVEL
+    bench = Bench(
+        {"b": (0.4,)}, masses=2, base=(1.0, 1.0, 0.0, 0.0, 0.0, 0.0), extra=-0.2 * wave(12.0), allowed=(one, two, shaft)
+    )
+    same, other = bench.space.demoted(bench.fit(one))
     assert same.effects == ("a",) and other.effects == ("b",) and other.parameters.masses == 1
     assert other.bic < same.bic
-    assert [f.effects for f in replace(bench.space, allowed=(A, B, shaft)).demoted(bench.fit(shaft))] == [("level",)], "no delay"
+    assert [f.effects for f in bench.space.demoted(bench.fit(shaft))] == [("level",)], "no delay"
 
 
 def test_demote_takes_the_spring_away_where_it_explains_nothing() -> None:
@@ -834,19 +836,34 @@ def test_where_one_with_impacts_leads_all_of_them_are_searched(monkeypatch: pyte
     assert bench.space.searched_alike(gap, [gap, alike]) == [gap, alike], "beside a gap that is there already"
 
 
-def test_where_impacts_leave_more_than_noise_the_others_are_rivals(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Its search may have missed the minimum of either."""
+@pytest.mark.parametrize(("noise", "left", "alike"), [(True, 0.9, False), (False, 0.9, True), (False, 0.2, False)])
+def test_where_impacts_leave_much_of_the_error_the_others_are_rivals(
+    monkeypatch: pytest.MonkeyPatch, noise: bool, left: float, alike: bool
+) -> None:
+    """Its search may have missed the minimum of either; not where it leaves noise, nor where it explains most of the error."""
     bench = Bench({"gap": (0.5,)}, masses=2)
-    gap, other = bench.fit(IMPACTS), replace(bench.fit(replace(IMPACTS, name="b")))
+    gap, other = bench.fit(IMPACTS), bench.fit(replace(IMPACTS, name="b"))
     assert other.bic > gap.bic + 10.0 * bench.space.margin, "far behind"
     space = type(bench.space)
     monkeypatch.setattr(space, "add", lambda self, fit: [other])
     monkeypatch.setattr(space, "instead", lambda self, fit, term: [other])
-    monkeypatch.setattr(space, "is_noise", lambda self, fit: True)
     monkeypatch.setattr(space, "deepened", lambda self, fit: fit)
-    for noise in (True, False):
-        monkeypatch.setattr(space, "small_unwhitened", lambda self, fit, noise=noise: noise)
-        assert [r.effect for r in rivals_of(bench.space, gap, "gap")[1]] == ([] if noise else ["b"])
+    monkeypatch.setattr(space, "small_unwhitened", lambda self, fit: noise)
+    monkeypatch.setattr(space, "unwhitened_cost", lambda self, fit: left if fit is gap else 1.0)
+    assert [r.effect for r in rivals_of(bench.space, gap, "gap")[1]] == (["b"] if alike else [])
+
+
+def test_rivals_are_in_the_order_after_their_search(monkeypatch: pytest.MonkeyPatch) -> None:
+    bench = Bench({"gap": (0.5,)}, masses=2)
+    gap = bench.fit(IMPACTS)
+    near, far = (
+        replace(bench.fit(replace(IMPACTS, name=name)), bic=gap.bic + behind) for name, behind in (("b", 1.0), ("c", 2.0))
+    )
+    space = type(bench.space)
+    monkeypatch.setattr(space, "add", lambda self, fit: [near, far])
+    monkeypatch.setattr(space, "quiet", lambda self, fit: False)
+    monkeypatch.setattr(space, "deepened", lambda self, fit: replace(far, bic=gap.bic - 5.0) if fit is far else fit)
+    assert [r.effect for r in rivals_of(bench.space, gap, "gap")[1]] == ["c", "b"]
 
 
 def test_another_effect_with_impacts_is_searched_in_the_place_of_one() -> None:

@@ -154,7 +154,9 @@ def controller_findings(data: DataSet, scales: Scales) -> tuple[list[Finding], A
     left = data.replayed_error({term: np.array([value])})
     std = _std(data, term, value, cost)
     better = cost < POLICY.better_reason**2 * before and np.isfinite(std)  # a limit that cuts nothing explains nothing
-    if cost < POLICY.replay_left * before or (better and (cost < POLICY.replay_rms**2 * floor or white_noise(left, logged))):
+    # A controller that winds up in the replay is off by more than the torque itself: less of that explains nothing yet.
+    most = POLICY.replay_left * min(before, float(np.sum((logged - np.mean(logged)) ** 2)))
+    if cost < most or (better and (cost < POLICY.replay_rms**2 * floor or white_noise(left, logged))):
         parameter = next(r for r in table() if r.name == effect).parameters[0]
         name, unit = parameter.name, parameter.unit
         text = say(

@@ -26,7 +26,7 @@ from gaident.estimation.criterion import cost_of, effective_samples
 from gaident.estimation.dataset import DataSet
 from gaident.estimation.global_search import evolved
 from gaident.estimation.noise_model import WHITE
-from gaident.estimation.objective import Fit, Hypothesis, Innovations, Objective, OutputErrors
+from gaident.estimation.objective import LOST, Fit, Hypothesis, Innovations, Objective, OutputErrors
 from gaident.estimation.prediction import ClosedLoop, ObserverLoop, OpenLoop, Predictor
 from gaident.estimation.term import Term
 from gaident.policy.table import POLICY, Policy
@@ -191,10 +191,13 @@ class ModelSpace:
 
         The simulation is exact to a share of what all effects change, with and without them (docs/effects.md).
         """
-        with_effects, refined = self.objective.error(fuller), self.objective.error(simpler)
         hypothesis, x = _linear_part(fuller)
-        linear = self.objective.error(replace(fuller, hypothesis=hypothesis, x=x))
+        driven = simpler.hypothesis.driven_by(fuller.predictor)
+        pairs = (fuller.hypothesis, fuller.x), (driven, simpler.x), (hypothesis, x)
+        with_effects, refined, linear = (self.objective.errors(h, y[None, :])[0] for h, y in pairs)
         changed = float(np.sum((linear - with_effects) ** 2))
+        if np.max(np.abs(linear)) >= LOST:  # without its effects the model diverges: what they change has no size
+            return True
         return bool(np.sum((refined - with_effects) ** 2) > self.policy.simulation_exact**2 * changed)
 
     def under_predictor_of(self, fit: Fit, other: Fit) -> Fit:

@@ -299,12 +299,7 @@ class Moves(Repeated):
         hypothesis, x = as_one_mass(fit)
         found = [self.continued(hypothesis, fit, x, self.policy.long)]
         # A second mass may only have made a delay of a lag, or a lag of a delay.
-        for term in hypothesis.parameters.terms:
-            for other in (t for t in self.allowed if t.in_series and term.in_series and t.size == term.size):
-                if other.name not in fit.effects:
-                    short, rest = hypothesis.without(term.name), hypothesis.parameters.removed(x, term.name)
-                    y = short.parameters.inserted(rest, x[hypothesis.parameters.slot(term.name)])
-                    found.append(self.refitted(short.extended(other), y, self.policy.long))
+        found += [self.refitted(h, y, self.policy.long) for h, y in self.in_other_series(hypothesis, x)]
         return found
 
     def close(self, fit: Fit) -> list[Fit]:

@@ -6,16 +6,19 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
-from gaident.diagnosis.selection.mechanisms import as_one_mass, on_a_shaft, resonance
+from gaident.diagnosis.selection.mechanisms import as_one_mass, is_mechanism, on_a_shaft, resonance
 from gaident.diagnosis.selection.side_moves import SideMoves
 from gaident.estimation import least_squares as ls
 from gaident.estimation.noise_model import WHITE
-from gaident.estimation.objective import Fit
+from gaident.estimation.objective import Fit, Hypothesis
 from gaident.estimation.projection import WORST
 from gaident.estimation.term import Term
 
 __all__ = ["Repeated"]
+
+Vector = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,6 +88,17 @@ class Repeated(SideMoves):
             X = np.array([short.parameters.inserted(x, np.array(row)) for row in rows])
             start = X[int(np.argmin(self.objective.costs(longer, X, WHITE)))]
             found.append(self.evolved(ls.scored(self.objective, ls.fit(self.objective, longer, start, WHITE, self.policy.short))))
+        return [f for f in found if f.cost < WORST and is_mechanism(f.parameters, f.x)]
+
+    def in_other_series(self, hypothesis: Hypothesis, x: Vector) -> list[tuple[Hypothesis, Vector]]:
+        """A model with another delay, lag or filter in the place of each one that it has, at the same number."""
+        found = []
+        for term in (t for t in hypothesis.parameters.terms if t.in_series):
+            short, rest = hypothesis.without(term.name), hypothesis.parameters.removed(x, term.name)
+            z = x[hypothesis.parameters.slot(term.name)]
+            for other in self.allowed:
+                if other.in_series and other.size == term.size and other.name not in hypothesis.effects:
+                    found.append((short.extended(other), short.parameters.inserted(rest, z)))
         return found
 
     def searched_alike(self, now: Fit, fits: Sequence[Fit]) -> list[Fit]:

@@ -35,21 +35,18 @@ def rivals_of(space: Moves, final: Fit, effect: str, equivalent: Collection[str]
     found = []
     turned = space.at_other_side(final, term)
     elsewhere = None if turned is None else turned.parameters.terms[-1].name
-    # Where a model with impacts leaves more than noise, the search has missed its minimum, or that of another one.
-    missed = term.impacts and not (space.is_noise(final) and space.small_unwhitened(final))
-    others = space.add(less)
+    others, missed = space.add(less), term.impacts and _missed(space, final, less)
     if missed:
         others = [*(f for f in others if not f.parameters.terms[-1].impacts), *space.instead(final, term)]
-        others = sorted(others, key=space.score)
-    for f in others:
+    if final.impacts and not space.quiet(final):
+        others = [space.deepened(f) for f in others]  # as the model itself was
+    for f in sorted(others, key=space.score):
         new = [t for t in f.parameters.terms if t.name not in final.effects]
         if len(new) != 1 or len(f.effects) != len(final.effects):
             continue
         (other,) = new
         if other.name == elsewhere:
             continue
-        if final.impacts and not space.quiet(final):
-            f = space.deepened(f)  # as the model itself was
         behind = f.bic - final.bic
         if other.name in equivalent:
             found.append(Replacement(other.name, behind, f))
@@ -70,3 +67,13 @@ def rivals_of(space: Moves, final: Fit, effect: str, equivalent: Collection[str]
         there = Replacement(elsewhere, turned.bic - final.bic, turned)
         found.insert(0 if not found or there.behind < found[0].behind else len(found), there)
     return float(gain), found
+
+
+def _missed(space: Moves, final: Fit, less: Fit) -> bool:
+    """Whether an effect with impacts leaves so much that its minimum was missed, or that of another effect with impacts.
+
+    More than noise, and more than the share `overrules` of the squared error before whitening that the model without it leaves.
+    """
+    if space.is_noise(final) and space.small_unwhitened(final):
+        return False
+    return space.unwhitened_cost(final) > space.policy.overrules * space.unwhitened_cost(less)

@@ -155,24 +155,14 @@ def _over_older(found: Selection, older: Objective, margin: float) -> tuple[Fit,
     As it is, without one of its lags and delays, or with another one in the place of that, whichever scores best.
     """
     space, final = found.space, found.final
-    tries = [final]
+    tries = [final, *(replace(final, hypothesis=h, x=x) for h, x in space.in_other_series(final.hypothesis, final.x))]
     for term in final.parameters.terms:
-        if not term.in_series:
-            continue
-        short, x, z = final.hypothesis.without(term.name), *_parted(final, term)
-        tries.append(replace(final, hypothesis=short, x=x))
-        for other in LIBRARY.values():
-            if other.in_series and other.size == term.size and other.name not in final.effects:
-                longer = short.extended(other)
-                tries.append(replace(final, hypothesis=longer, x=short.parameters.inserted(x, z)))
+        if term.in_series:
+            x = final.parameters.removed(final.x, term.name)
+            tries.append(replace(final, hypothesis=final.hypothesis.without(term.name), x=x))
     space = replace(space, objective=replace(space.objective, data=older.data))
     closest = min((_fitted_to(older.data, f, space) for f in tries), key=space.score)
     return closest, space.score(closest) < found.space.score(final) - margin
-
-
-def _parted(fit: Fit, term: Term) -> tuple[Vector, Vector]:
-    """(x without an effect, the coordinates of the effect)."""
-    return fit.parameters.removed(fit.x, term.name), fit.x[fit.parameters.slot(term.name)]
 
 
 def _ahead(data: DataSet, model: Model) -> TorqueLag | None:
