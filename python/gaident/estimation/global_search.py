@@ -34,14 +34,14 @@ PART, LEAST = 0.15, 0.3  # no decision: a start; where one mass is searched: par
 STEPS, STEPS_IMPACTS = 0.7, 5.0  # no decision: a start; the same of an effect, in its steps, and of one with impacts
 SHAFT = np.array([0.05, 1.0, 1.6, 1.0, 1.6, 0.5])  # no decision: a start; the same of two masses, in the coordinates above
 LEAST_DAMPING = 5e-3  # no decision: a start; the damping ratio from which one is searched that is less, or negative
-NEAREST = 0.1  # no decision: a start; the share of the reach within which the nearest members are drawn
+NEAREST = 0.01  # no decision: a start; the share of the reach within which the nearest members are drawn
 
 
 def evolved(objective: Objective, found: Fit, generations: int, draw: int = 0) -> Fit:
     """Differential evolution around a fit (Storn and Price 1997), then least squares from where it ends.
 
     The first members are near the fit in some coordinates and far in others.
-    Each is drawn within a share of the reach: 1 in half of them, and from 0.1 to 1, evenly in its logarithm, in the others.
+    Each is drawn within a share of the reach: 1 in half of them, and from 0.01 to 1, evenly in its logarithm, in the others.
     draw: of several searches from the same fit, whose members differ.
     """
     from scipy.optimize import differential_evolution

@@ -873,6 +873,31 @@ def test_another_effect_with_impacts_is_searched_in_the_place_of_one() -> None:
     assert found.effects == ("a", "valley") and found.x[-1] == pytest.approx(0.52, abs=2e-3)
 
 
+def test_in_the_place_of_an_effect_another_is_fitted_beside_the_values_of_the_rest() -> None:
+    """Where it was fitted the impacts lay elsewhere: it seemed far behind. It is searched globally within its reach alone."""
+    hit = replace(VALLEY, place="coupling")
+    bench = Bench({"valley": (0.52,), "a": (0.4,)}, masses=2)
+    fit = bench.space.deepened(bench.fit(hit, A))
+    assert fit.x[fit.parameters.slot("valley")] == pytest.approx(0.52, abs=2e-3)
+    stuck = bench.fit(hit, B)
+    assert abs(stuck.x[stuck.parameters.slot("valley")] - 0.52) > 0.1
+    near = bench.space.in_its_place(fit, A, stuck, 0.0)
+    assert near.effects == ("valley", "b") and bench.space.score(near) < bench.space.score(stuck)
+    assert near.x[near.parameters.slot("valley")] == pytest.approx(0.52, abs=2e-3)
+
+
+def test_in_the_place_of_an_effect_what_is_within_reach_is_searched_globally(monkeypatch: pytest.MonkeyPatch) -> None:
+    bench = Bench({"a": (0.4,), "gap": (0.5,)}, masses=2)
+    fit, other = bench.fit(IMPACTS, A), bench.fit(IMPACTS, B)
+    asked: list[Fit] = []
+    monkeypatch.setattr(type(bench.space), "deepened", lambda space, f: asked.append(f) or f)
+    behind = bench.space.score(other) - bench.space.score(fit)
+    assert behind > 0.0
+    bench.space.in_its_place(fit, A, other, 0.5 * behind)
+    assert not asked, "too far behind"
+    assert bench.space.in_its_place(fit, A, other, 2.0 * behind) is asked[0]
+
+
 def test_demoted_takes_a_linear_model_too() -> None:
     bench = Bench({"a": (0.4,)}, masses=2)
     (one,) = bench.space.demoted(bench.fit())

@@ -15,6 +15,7 @@ A model is a mechanism (one mass or two) with effects. The moves are
     search      the same model again, from all starts, globally beside stops and impacts, under the best predictor
     alike       all models with impacts that were grown, searched globally where one of them leads
     instead     another effect with impacts in the place of one, searched globally
+    in place    another effect in the place of one beside impacts, fitted as closely
     elsewhere   two masses with the same effects, with another resonance
 
 Whether an effect is added is one decision, `ModelSpace.worth`; a search of the same model compares its BIC alone.

@@ -90,6 +90,20 @@ class Repeated(SideMoves):
             found.append(self.evolved(ls.scored(self.objective, ls.fit(self.objective, longer, start, WHITE, self.policy.short))))
         return [f for f in found if f.cost < WORST and is_mechanism(f.parameters, f.x)]
 
+    def in_its_place(self, fit: Fit, term: Term, other: Fit, reach: float) -> Fit:
+        """A model with another effect in the place of one, fitted as closely as a fit with impacts is.
+
+        Its own fit began beside the values that the rest has without that effect, where other impacts make the least errors.
+        So it is fitted beside the values of the rest too, and searched globally where it comes within `reach` of the fit.
+        """
+        (name,) = set(other.effects) - set(fit.effects)
+        short, x = fit.hypothesis.without(term.name), fit.parameters.removed(fit.x, term.name)
+        if other.parameters.kind == fit.parameters.kind and set(other.effects) - {name} == set(short.effects):
+            longer = short.extended(other.parameters.term(name)).driven_by(other.predictor)
+            start = short.parameters.inserted(x, other.x[other.parameters.slot(name)])
+            other = min((other, self.refitted(longer, start, self.policy.long)), key=self.score)
+        return self.deepened(other) if self.score(other) < self.score(fit) + reach else other
+
     def in_other_series(self, hypothesis: Hypothesis, x: Vector) -> list[tuple[Hypothesis, Vector]]:
         """A model with another delay, lag or filter in the place of each one that it has, at the same number."""
         found = []

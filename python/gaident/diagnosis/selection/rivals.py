@@ -34,19 +34,16 @@ def rivals_of(space: Moves, final: Fit, effect: str, equivalent: Collection[str]
     term = final.parameters.term(effect)
     found = []
     turned = space.at_other_side(final, term)
-    elsewhere = None if turned is None else turned.parameters.terms[-1].name
+    elsewhere = "" if turned is None else turned.parameters.terms[-1].name
     others, missed = space.add(less), term.impacts and _missed(space, final, less)
     if missed:
         others = [*(f for f in others if not f.parameters.terms[-1].impacts), *space.instead(final, term)]
+    others = [f for f in others if _only_new(f, final) not in ("", elsewhere)]
     if final.impacts and not space.quiet(final):
-        others = [space.deepened(f) for f in others]  # as the model itself was
+        reach = space.policy.rival_reach * gain
+        others = [space.in_its_place(final, term, f, reach) for f in others]
     for f in sorted(others, key=space.score):
-        new = [t for t in f.parameters.terms if t.name not in final.effects]
-        if len(new) != 1 or len(f.effects) != len(final.effects):
-            continue
-        (other,) = new
-        if other.name == elsewhere:
-            continue
+        other = f.parameters.term(_only_new(f, final))
         behind = f.bic - final.bic
         if other.name in equivalent:
             found.append(Replacement(other.name, behind, f))
@@ -63,10 +60,16 @@ def rivals_of(space: Moves, final: Fit, effect: str, equivalent: Collection[str]
                 continue
         if behind < space.margin or (missed and other.impacts):
             found.append(Replacement(other.name, behind, f))
-    if turned is not None and elsewhere is not None and turned.bic - final.bic < space.margin:
+    if turned is not None and turned.bic - final.bic < space.margin:
         there = Replacement(elsewhere, turned.bic - final.bic, turned)
         found.insert(0 if not found or there.behind < found[0].behind else len(found), there)
     return float(gain), found
+
+
+def _only_new(fit: Fit, final: Fit) -> str:
+    """The one effect that another model has in the place of one of the final model's; "" where more is different."""
+    new = [e for e in fit.effects if e not in final.effects]
+    return new[0] if len(new) == 1 and len(fit.effects) == len(final.effects) else ""
 
 
 def _missed(space: Moves, final: Fit, less: Fit) -> bool:
