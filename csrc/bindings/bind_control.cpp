@@ -47,13 +47,15 @@ Start start_named(const std::string& name) {
     throw std::invalid_argument("start must be 'rest', 'steady' or 'free', not '" + name + "'");
 }
 
-// The torque that a servo makes of measured signals, one after the other at its own clock; from rest.
+// The torque that a servo makes of measured signals, one after the other at its own clock; from rest, under a load that asks for `stored`.
 RealArray servo_torque(const Clock& clock, const Loop& loop, const RealArray& source, const RealArray& velocity,
-                       const RealArray& position, const RealArray& velocity_feedforward, const RealArray& torque_feedforward) {
+                       const RealArray& position, const RealArray& velocity_feedforward, const RealArray& torque_feedforward,
+                       double stored) {
     const py::ssize_t n = source.size();
     for (const RealArray* signal : {&velocity, &position, &velocity_feedforward, &torque_feedforward})
         if (signal->size() != n) throw std::invalid_argument("every signal needs as many samples as the source");
     Servo<double> servo(loop.controller, loop.servo, clock.period);
+    if (stored != 0.0) servo.rest(0.0, 0.0, 0.0, stored);
     RealArray torque(n);
     for (py::ssize_t i = 0; i < n; ++i) {
         const double r = servo.command(static_cast<std::size_t>(i), source.at(i), velocity_feedforward.at(i), position.at(i));
@@ -141,7 +143,7 @@ void bind_control(py::module_& m) {
             return loop;
         });
     m.def("servo_torque", &servo_torque, py::kw_only(), py::arg("clock"), py::arg("loop"), py::arg("source"), py::arg("velocity"),
-          py::arg("position"), py::arg("velocity_feedforward"), py::arg("torque_feedforward"));
+          py::arg("position"), py::arg("velocity_feedforward"), py::arg("torque_feedforward"), py::arg("stored"));
     m.attr("MOST_STATES") = max_loop_order;
     m.def(
         "servo_order",

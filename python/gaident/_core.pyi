@@ -135,8 +135,9 @@ def servo_torque(
     position: NDArray[np.float64],
     velocity_feedforward: NDArray[np.float64],
     torque_feedforward: NDArray[np.float64],
+    stored: float,
 ) -> NDArray[np.float64]:
-    """Torque [N m] that a servo makes of measured signals at its own clock, from rest."""
+    """Torque [N m] that a servo makes of measured signals at its own clock, from rest; stored: of its integrator, before."""
 
 class Loop:
     """How the loop is closed, "continuous", "sampled", "servo" or "open", and over which controller; "open" has none."""

@@ -324,7 +324,7 @@ class Cascade(Controller):
         read = self.position is None or log.position is not None
         return read and self.command_of(log) is not None and self.log_every(log.dt) == 1
 
-    def torque_of(self, log: LoopSignals, also: Limiting | None = None) -> Vector:
+    def torque_of(self, log: LoopSignals, also: Limiting | None = None, stored: float = 0.0) -> Vector:
         """See `Controller`."""
         source, dt = self.command_of(log), log.dt
         assert source is not None
@@ -335,7 +335,7 @@ class Cascade(Controller):
                 followed = rate_limited(self.asked(log), also.slope, dt, 0.0)
                 ticks = replace(ticks, source=followed, velocity_feedforward=np.zeros(0), position=np.zeros(0))
                 limited = replace(limited, position=None, position_period=None, velocity_feedforward=0.0, command_filters=())
-        return core.servo_torque(dt, ticks, log.velocity, limited.core_loop(dt))
+        return core.servo_torque(dt, ticks, log.velocity, limited.core_loop(dt), stored)
 
     def with_limits(self, torque: float | None, integrator: float | None) -> Cascade:
         """See `Controller`."""

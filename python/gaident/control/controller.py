@@ -174,10 +174,10 @@ class Controller(ABC):
         """Whether the log contains every signal that it makes its torque of, at each of its samples."""
 
     @abstractmethod
-    def torque_of(self, log: LoopSignals, also: Limiting | None = None) -> Vector:
+    def torque_of(self, log: LoopSignals, also: Limiting | None = None, stored: float = 0.0) -> Vector:
         """The torque [N m] (n,) that it makes of the measured signals, from rest; `also`: with further limits.
 
-        The log is `replayable`.
+        stored: what the integrator holds before the log begins [N m], for a load. The log is `replayable`.
         """
 
     @abstractmethod

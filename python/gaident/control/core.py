@@ -98,10 +98,11 @@ def effect_record(
     )
 
 
-def servo_torque(dt: float, ticks: Ticks, velocity: Vector, servo: _core.Loop) -> Vector:
+def servo_torque(dt: float, ticks: Ticks, velocity: Vector, servo: _core.Loop, stored: float = 0.0) -> Vector:
     """Torque [N m] that a servo makes of measured signals, from rest, at each of its samples: (n r,), r to a line of the log.
 
     dt: sample time of the log [s]; velocity (n r,) [rad/s]: at the controller's samples, as everything in `ticks`.
+    stored: what its integrator, and the filters behind it, hold before the first sample [N m].
     """
     none = np.zeros(len(velocity))
     fed, added, position = ticks.velocity_feedforward, ticks.torque_feedforward, ticks.position
@@ -113,6 +114,7 @@ def servo_torque(dt: float, ticks: Ticks, velocity: Vector, servo: _core.Loop) -
         position=position if len(position) else none,
         velocity_feedforward=fed if len(fed) else none,
         torque_feedforward=added if len(added) else none,
+        stored=stored,
     )
 
 

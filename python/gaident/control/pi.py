@@ -229,15 +229,15 @@ class PI(Controller):
         """See `Controller`."""
         return log.command is not None
 
-    def torque_of(self, log: LoopSignals, also: Limiting | None = None) -> Vector:
+    def torque_of(self, log: LoopSignals, also: Limiting | None = None, stored: float = 0.0) -> Vector:
         """See `Controller`."""
         command, limited = self.asked(log), self
         if also is not None:
             command = command if math.isinf(also.slope) else rate_limited(command, also.slope, log.dt, 0.0)
             limited = self.with_limits(self.torque_limit, min(also.integrator, self.limits[1]))
         if self.bare:
-            return pi_torque(command, log.velocity, log.dt, limited)
-        return core.servo_torque(log.dt, of_lines(command, None), log.velocity, limited.core_loop(log.dt))
+            return pi_torque(command, log.velocity, log.dt, limited, stored)
+        return core.servo_torque(log.dt, of_lines(command, None), log.velocity, limited.core_loop(log.dt), stored)
 
     def with_limits(self, torque: float | None, integrator: float | None) -> PI:
         """See `Controller`; without a torque limit there is nothing for an anti-windup to act at."""

@@ -29,7 +29,7 @@ from gaident.diagnosis.records.arguments import (
 from gaident.diagnosis.work import Work
 from gaident.errors import SettingsError
 from gaident.identification.identify import identify
-from gaident.models.drive_torque import torque_driven
+from gaident.identification.replay.driven_records import torque_driven
 from gaident.policy.table import POLICY
 from gaident.results.diagnosis import Diagnosis
 from gaident.results.finding import Finding

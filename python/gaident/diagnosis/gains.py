@@ -28,10 +28,10 @@ from gaident.estimation.dataset import DataSet
 from gaident.estimation.least_squares import fit
 from gaident.estimation.objective import Fit, Objective
 from gaident.models import simulate
+from gaident.models.made_torque import stored_torque
 from gaident.models.model import Model
 from gaident.models.simulate import initial_state
 from gaident.models.starts import noise_std, starts_moving
-from gaident.models.stored_torque import stored_torque
 from gaident.policy.table import POLICY
 from gaident.results.fitness import IN_SAMPLE, Fitness
 

@@ -26,11 +26,11 @@ from gaident.data.torque_kind import MEASURED
 from gaident.estimation.mean_velocity import means, with_middles
 from gaident.estimation.period import period_of_place
 from gaident.estimation.term import Term, limiting_of
-from gaident.models.drive_torque import late, torque_of
+from gaident.models.drive_torque import torque_of
+from gaident.models.made_torque import late, stored_torque
 from gaident.models.simulate_many import LoadedRecord
 from gaident.models.simulation_input import followed
 from gaident.models.starts import noise_std, starts_moving
-from gaident.models.stored_torque import stored_torque
 from gaident.policy.table import POLICY
 
 __all__ = ["DataSet", "with_angle"]
@@ -335,8 +335,8 @@ class DataSet:
     def replayed(self, effects: Mapping[Term, Vector]) -> tuple[Record, ...]:
         """The records as driven by the torque that the controller makes with effects of its own, each with its parameters."""
         driven = []
-        for r, read in zip(self.records, self.read, strict=True):
-            driven.append(_driven(r, replayed(read, self.controller, effects)))
+        for r, read, stored in zip(self.records, self.read, self.stored, strict=True):
+            driven.append(_driven(r, replayed(read, self.controller, effects, stored)))
         return tuple(driven)
 
     def freed(self, driven: Sequence[Record]) -> tuple[Record, ...]:
@@ -347,8 +347,8 @@ class DataSet:
         """Logged torque minus the controller's replay with these effects, records one after the other [N m]."""
         assert self.controller is not None
         known = [len(r) - self.controller.ahead(r.dt) for r in self.read]
-        off = [(torque_in(r) - replayed(r, self.controller, effects))[:n] for r, n in zip(self.read, known, strict=True)]
-        return np.concatenate(off)
+        rows = zip(self.read, known, self.stored, strict=True)
+        return np.concatenate([(torque_in(r) - replayed(r, self.controller, effects, held))[:n] for r, n, held in rows])
 
     def with_effects(self, effects: Mapping[Term, Vector]) -> DataSet:
         """The same with records and controller as effects at the controller, which are known, make them in the simulated loop."""
@@ -360,10 +360,10 @@ class DataSet:
         return replace(self, records=records, turned=turned, controller=limited)
 
 
-def replayed(rec: Record, controller: Controller | None, effects: Mapping[Term, Vector]) -> Vector:
-    """What the controller makes of command and measured velocity, with effects of its own [N m]."""
+def replayed(rec: Record, controller: Controller | None, effects: Mapping[Term, Vector], stored: float) -> Vector:
+    """What the controller makes of command and measured velocity, with effects of its own [N m]; stored: before the record."""
     assert controller is not None and controller.replayable(rec)
-    return controller.torque_of(rec, limiting_of(effects) if effects else None)
+    return controller.torque_of(rec, limiting_of(effects) if effects else None, stored)
 
 
 def with_angle(rec: Record, angle: Vector | None) -> Record:

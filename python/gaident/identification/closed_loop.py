@@ -15,8 +15,9 @@ from gaident.control.pi import bare_pi
 from gaident.data.record import Record
 from gaident.errors import RecordError
 from gaident.identification.logged_torque import corrected, not_followed
+from gaident.identification.replay.driven_records import torque_driven
 from gaident.identification.space import derive_space
-from gaident.models.drive_torque import as_old_as_its_velocity, straight_driven, torque_driven
+from gaident.models.drive_torque import as_old_as_its_velocity, straight_driven
 from gaident.models.held_torque import held_torque
 from gaident.models.search_space import SearchSpace
 from gaident.models.starts import starts_moving

@@ -17,6 +17,7 @@ from gaident.control.cascade import Cascade
 from gaident.control.pi import PI
 from gaident.control.ticks import at_the_clock, smooth_between
 from gaident.data.record import Record
+from gaident.models.made_torque import stored_beside
 from gaident.models.starts import starts_moving
 from gaident.policy.table import POLICY
 
@@ -41,12 +42,18 @@ class Log:
     moving: bool = False
 
     def made(self, cascade: Cascade, straight: bool = False) -> Vector:
-        """What the controller makes at the lines of the log [N m] (n,); straight: of a velocity straight between the lines."""
+        """What the controller makes at the lines of the log [N m] (n,); straight: of a velocity straight between the lines.
+
+        Of a record that begins under load, with what the torque shows that the integrator stored.
+        """
         every = len(self.velocity) // len(self.source)
         velocity = at_the_clock(self.velocity[::every], every) if straight else self.velocity
         ticks = cascade.ticks(self.dt, self.source, self.position)
-        torque = core.servo_torque(self.dt, ticks, velocity, cascade.core_loop(self.dt))
-        return torque[:: len(torque) // len(self.source)]
+        loop = cascade.core_loop(self.dt)
+        torque = core.servo_torque(self.dt, ticks, velocity, loop)[::every]
+        if self.moving or not (stored := stored_beside(self.torque, torque, cascade)):
+            return torque
+        return core.servo_torque(self.dt, ticks, velocity, loop, stored)[::every]
 
 
 def log_of(rec: Record, share: int, cascade: Cascade, whole: bool) -> Log:

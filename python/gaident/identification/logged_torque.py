@@ -33,7 +33,7 @@ from gaident.errors import GaidentError
 from gaident.identification.controller_numbers import with_estimates
 from gaident.identification.logged_stretches import Log, centred, correlation, log_of, whitened
 from gaident.identification.number_words import interpolated
-from gaident.models.drive_torque import follows_not, torque_driven
+from gaident.identification.replay.driven_records import follows_not, torque_driven
 from gaident.models.starts import noise_std, starts_moving
 from gaident.policy.table import POLICY
 from gaident.results.estimate import Estimate

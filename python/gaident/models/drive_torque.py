@@ -2,38 +2,29 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from typing import NamedTuple
+from collections.abc import Iterator
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gaident.arguments import TORQUE
-from gaident.axis import Text, say
-from gaident.control import core
-from gaident.control.beside import beside_pi
 from gaident.control.controller import Controller
-from gaident.control.pi import PI, bare_pi
+from gaident.control.pi import PI
 from gaident.control.pi_torque import pi_block
-from gaident.control.ticks import at_the_clock, smooth_between
+from gaident.control.ticks import at_the_clock
 from gaident.data.record import Record
 from gaident.data.signals.difference import is_backward_difference
 from gaident.errors import RecordError
-from gaident.models.starts import constant_beside, starts_moving
-from gaident.policy.table import POLICY
+from gaident.models.made_torque import late, made_at_its_clock, stored_torque
+from gaident.models.starts import starts_moving
 
 __all__ = [
     "HALF",
-    "Driven",
     "as_old_as_its_velocity",
     "driven_by",
-    "follows_not",
-    "late",
-    "made_at_its_clock",
     "made_by",
     "straight_driven",
     "torque_blocks",
-    "torque_driven",
     "torque_of",
 ]
 
@@ -41,63 +32,6 @@ Vector = NDArray[np.float64]
 
 TWO_MASSES = 3  # no decision: how many poles two masses have
 HALF = 0.5  # no decision: of a sample, the age of a mean over it
-
-
-class Driven(NamedTuple):
-    """Records as an estimation takes them under their controller; notes on that.
-
-    doubts: notes on logged torques that do not follow from the controller. slower: whether the log has fewer lines than the
-    controller samples.
-    """
-
-    records: tuple[Record, ...]
-    controller: Controller | None
-    notes: tuple[Text, ...] = ()
-    doubts: tuple[Text, ...] = ()
-    slower: bool = False
-
-    @property
-    def loop(self) -> PI | None:
-        """What an identification closes the loop over; None: the torque drives the model."""
-        return bare_pi(self.controller)
-
-
-def torque_driven(records: Sequence[Record], controller: Controller | None) -> Driven:
-    """The records as they are under a bare PI or in the open loop; under any other controller as driven by their torque."""
-    if controller is None or controller.one_equation:
-        return Driven(tuple(records), controller)
-    every = max(controller.log_every(r.dt) for r in records)
-    if every == 1:
-        has = beside_pi(controller)
-        text = "Your controller has {}; so the linear model is identified from its {torque}, not in a simulated loop."
-        note = say(text, f"{has} beside kp and ki" if has else "a sample time of its own")
-    else:
-        text = (
-            "The controller samples {} times for each line of the log. The linear model is identified from the logged "
-            "{torque}, between the lines as this controller makes it; what it answered to noise there is lost."
-        )
-        note = say(text, every)
-    doubts = []
-    for rec in records:
-        if rec.torque is None or not controller.replayable(rec):
-            continue
-        known = len(rec) - controller.ahead(rec.dt)
-        left = (rec.torque - controller.torque_of(rec))[:known]
-        left = left - constant_beside(left, float(np.abs(rec.torque).max()))
-        off = float(np.sqrt(np.mean(left**2)))
-        size = float(np.sqrt(np.mean(rec.torque**2)))
-        if off > POLICY.negligible * size:
-            doubts.append(follows_not(rec.name if len(records) > 1 else "", off, size))
-    return Driven(tuple(driven_by(r, controller) for r in records), controller, (note,), tuple(doubts), every > 1)
-
-
-def follows_not(name: str, off: float, size: float) -> Text:
-    """What is said of a logged torque that a controller does not make; name: of the record, off, size: rms [N m]."""
-    text = (
-        "{}The logged {torque} does not follow from command and velocity through this controller: by {:.2g} {N m} rms, "
-        "of {:.2g} {N m} rms. Is this the controller, and are these the signals it saw?"
-    )
-    return say(text, f"{name}: " if name else "", off, size)
 
 
 def driven_by(rec: Record, controller: Controller) -> Record:
@@ -111,10 +45,12 @@ def driven_by(rec: Record, controller: Controller) -> Record:
     """
     every = controller.log_every(rec.dt)
     torque = made_by(rec, controller) if rec.torque is None else rec.torque
-    before = torque[0] if starts_moving(rec.with_channels(torque=torque), None) else 0.0
+    whole = rec.with_channels(torque=torque)
+    stored = stored_torque(whole, controller, driven=False)
+    before = torque[0] if starts_moving(whole, None) else stored
     if every == 1:
         return rec.with_channels(torque=late(torque, controller.delay / rec.dt, before))
-    mean = _at_its_clock(rec, torque, controller).reshape(len(rec), every).mean(axis=1)
+    mean = _at_its_clock(rec, torque, controller, stored).reshape(len(rec), every).mean(axis=1)
     return rec.with_channels(torque=late(mean, controller.delay / rec.dt, before))
 
 
@@ -130,45 +66,21 @@ def straight_driven(rec: Record, controller: Controller) -> Record:
     return rec.with_channels(torque=late(mean, controller.delay / rec.dt, before))
 
 
-def _at_its_clock(rec: Record, torque: Vector, controller: Controller) -> Vector:
+def _at_its_clock(rec: Record, torque: Vector, controller: Controller, stored: float) -> Vector:
     """A torque logged now and then [N m] (n,) at all of the controller's samples (n every,).
 
     Between the lines it goes as this controller makes it of command and velocity, and what it is off by on the lines goes
     straight. Where that changes more from line to line than the torque itself, the torque goes straight.
+    stored: what the integrator held before the record [N m].
     """
     every = controller.log_every(rec.dt)
-    made = made_at_its_clock(rec, controller)
+    made = made_at_its_clock(rec, controller, stored)
     if made is not None:
         off = torque - made[::every]
         if np.sum(np.diff(off) ** 2) < np.sum(np.diff(torque) ** 2):
             between: Vector = made + at_the_clock(off, every)
             return between
     return at_the_clock(torque, every)
-
-
-def made_at_its_clock(rec: Record, controller: Controller) -> Vector | None:
-    """The torque that a controller makes from rest at all of its samples [N m] (n every,), of command and of the velocity smooth
-    between the lines; None where the record lacks what it reads."""
-    source = controller.command_of(rec)
-    if source is None or any(getattr(rec, channel) is None for channel in controller.reads):
-        return None
-    ticks = controller.ticks(rec.dt, source, rec.position if controller.driven_by == "position_command" else None)
-    velocity = smooth_between(rec.velocity, controller.log_every(rec.dt))
-    return core.servo_torque(rec.dt, ticks, velocity, controller.core_loop(rec.dt))
-
-
-def late(torque: Vector, delay: float, before: float) -> Vector:
-    """The mean over each line of a torque (n,) that is held over each line and acts `delay` lines later; `before` the record.
-
-    With delay = m + f, m whole: f u(n - m - 1) + (1 - f) u(n - m), exact in its mean and, for f = 0, everywhere.
-    A delay below 0, down to -1/2, is of a torque that the log has now and then: it is on its way to that of the next line.
-    """
-    if delay < 0.0:
-        return np.append((1.0 + delay) * torque[:-1] - delay * torque[1:], torque[-1])
-    m = int(delay)
-    f = delay - m
-    padded = np.concatenate([np.full(m + 1, before), torque])
-    return f * padded[: len(torque)] + (1.0 - f) * padded[1 : 1 + len(torque)] if delay > 0.0 else torque
 
 
 def as_old_as_its_velocity(rec: Record) -> Record:

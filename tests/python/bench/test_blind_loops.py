@@ -13,7 +13,7 @@ import gaident as ga
 from blind_judge import Judgement, judge
 from drive_cases import random_case
 from drive_rig import skip_without_library
-from gaident.models.drive_torque import torque_driven
+from gaident.identification.replay.driven_records import torque_driven
 from loop_cases import EVERY, LOOPS, loop_effects, loop_kind, loop_noise, loop_plant
 from places import BENCH
 

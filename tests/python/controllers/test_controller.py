@@ -16,7 +16,7 @@ from gaident.control.beside import beside_pi
 from gaident.control.cascade import controller_of
 from gaident.control.pi import PI
 from gaident.errors import ControllerError
-from gaident.models.drive_torque import torque_driven
+from gaident.identification.replay.driven_records import torque_driven
 
 
 def test_defaults_are_a_digital_controller_without_limits() -> None:

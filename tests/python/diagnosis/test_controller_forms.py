@@ -20,8 +20,8 @@ from gaident.diagnosis.controller.slow_forms import limited
 from gaident.diagnosis.explain.alternatives import alternatives_of
 from gaident.diagnosis.explain.verdict import verdict_of
 from gaident.identification.logged_torque import not_followed
+from gaident.identification.replay.driven_records import torque_driven
 from gaident.identification.replay.replay import replay
-from gaident.models.drive_torque import torque_driven
 from referee_logs import GIVEN, KI, KP, NOTCH, T, command, dip, log, low, slower
 
 

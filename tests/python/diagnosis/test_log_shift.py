@@ -17,7 +17,7 @@ from gaident.diagnosis.controller.form_findings import loop_of
 from gaident.diagnosis.controller.log_shift import Aligned, aligned
 from gaident.errors import ReadError, RecordError
 from gaident.estimation.regression.torque_lag import torque_lag
-from gaident.models.drive_torque import torque_driven
+from gaident.identification.replay.driven_records import torque_driven
 from gaident.models.effects_linear import LINEAR, response_of
 
 RIGID = Plant(3e-4, 2e-3, 0.03, 1.9, 1e-3, name="rigid")

@@ -19,7 +19,7 @@ from gaident.estimation.dataset import DataSet
 from gaident.estimation.mean_velocity import means, with_middles
 from gaident.estimation.noise_model import WHITE
 from gaident.estimation.objective import Objective
-from gaident.models.drive_torque import late
+from gaident.models.made_torque import late
 from gaident.reporting.runs import run_of
 
 T, LINES = 0.5e-3, 2**20

@@ -10,7 +10,7 @@ import pytest
 import gaident as ga
 from drive_rig import Noise, Plant, rig, skip_without_library
 from gaident.estimation.regression.torque_lag import torque_lag
-from gaident.models.drive_torque import late
+from gaident.models.made_torque import late
 
 DT, EVERY, KP, KI, SLOPE = 1e-3, 4, 0.08, 4.0, 1500.0
 NOTCHED = ga.Cascade(ga.PI(KP, KI), DT / EVERY, position=ga.P(20.0), torque_filters=(ga.Notch(200.0, 0.1, 0.7),))

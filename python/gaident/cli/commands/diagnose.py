@@ -18,8 +18,8 @@ from gaident.cli.result_files import ResultFiles, shown_block
 from gaident.diagnosis.diagnose import diagnose
 from gaident.drive.drive_file import Drive, axes_in
 from gaident.errors import GaidentError, SettingsError
+from gaident.identification.replay.driven_records import torque_driven
 from gaident.identification.space import derive_space
-from gaident.models.drive_torque import torque_driven
 from gaident.results.diagnosis import Diagnosis
 from gaident.results.identification import Identification
 from gaident.results.json_text import on_axis

@@ -24,7 +24,8 @@ from gaident.diagnosis.controller.other_form import other_form
 from gaident.diagnosis.selection.other_gains import OTHER_GAINS, OtherGains
 from gaident.diagnosis.selection.unlogged_form import UnloggedForm
 from gaident.identification.logged_torque import comparable, corrected, not_followed
-from gaident.models.drive_torque import Driven, driven_by, straight_driven
+from gaident.identification.replay.driven_records import Driven
+from gaident.models.drive_torque import driven_by, straight_driven
 from gaident.results.estimate import Estimate
 from gaident.results.finding import Finding
 

@@ -6,8 +6,7 @@ feedforwards, filters. All forms are compared by one criterion, with n samples, 
     n ln(max(rss/n, floor^2)) + k ln n + 2 m ln 3
 
 floor: the root mean square error of a replay by the rounding of the log; a smaller error shows nothing.
-The least counts, and only if the torque follows from it: `gaident.models.drive_torque.made_by` runs the controller on all
-measured signals.
+The least counts, and only if the torque follows from it: the controller runs on all measured signals.
 """
 
 from __future__ import annotations
@@ -55,7 +54,6 @@ from gaident.estimation.criterion import bic, cost_of
 from gaident.estimation.projection import inverse_of
 from gaident.identification.replay.causes import white_noise
 from gaident.identification.replay.replay import tolerance_of, velocity_steps
-from gaident.models.drive_torque import made_by
 from gaident.policy.table import POLICY
 
 __all__ = ["Form", "Shown", "form_shown"]
@@ -209,13 +207,13 @@ def _shown(records: Sequence[Record], law: Law, given: PI, candidates: Sequence[
     off, exact = [], True
     for rec, start, allowed in zip(records, starts, _allowed(records, law, controller.velocity), strict=True):
         assert rec.torque is not None
-        left = rec.torque - made_by(rec.with_channels(torque=None), controller) - start
+        left = rec.torque - controller.torque_of(rec, stored=float(start))
         if float(np.abs(left).max()) > allowed:
             exact = False
             if not white_noise(left, rec.torque):
                 return None
         off.append(left)
-    before = [r.torque - made_by(r.with_channels(torque=None), Cascade(given)) for r in records if r.torque is not None]
+    before = [r.torque - Cascade(given).torque_of(r) for r in records if r.torque is not None]
     return Shown(
         controller=controller,
         numbers=named(best, numbers, filters, cov, law.period),

@@ -17,7 +17,7 @@ from gaident.identification.adequacy import white_lags
 from gaident.identification.noise import chi2_tail, ljung_box
 from gaident.policy.table import POLICY
 
-__all__ = ["Explanation", "control_error", "explain", "rounded_command", "white_noise"]
+__all__ = ["Explanation", "control_error", "explain", "rounded_command", "under_load", "white_noise"]
 
 Vector = NDArray[np.float64]
 
@@ -126,8 +126,13 @@ def white_noise(off: Vector, logged: Vector) -> float:
 def _start(case: _Case) -> Iterator[Explanation]:
     """A record that starts under load: the integral is not 0 where it begins."""
     start = float(np.median(case.logged - case.torque(case.controller)))
+    yield under_load(case.torque(case.controller, start), start)
+
+
+def under_load(torque: Vector, start: float) -> Explanation:
+    """The explanation of a torque [N m] that is made with so much in the integrator before the record [N m]."""
     sentence = say("with {:.4g} {N m} in the integrator at the record's start: the record begins under load.", start)
-    yield Explanation(case.torque(case.controller, start), "initial_integral", start, sentence)
+    return Explanation(torque, "initial_integral", start, sentence)
 
 
 def _limits(case: _Case) -> Iterator[Explanation]:

@@ -23,7 +23,8 @@ from gaident.control.pi import PI, bare_pi
 from gaident.data.record import Record
 from gaident.data.signals.lattice import digits_step, lattice_step, place_step, rounding_step
 from gaident.errors import RecordError
-from gaident.identification.replay.causes import explain, rounded_command, white_noise
+from gaident.identification.replay.causes import Explanation, explain, rounded_command, under_load, white_noise
+from gaident.models.made_torque import stored_torque
 from gaident.policy.table import POLICY
 
 __all__ = ["Replay", "replay", "rounding_of", "tolerance_of", "velocity_steps"]
@@ -112,9 +113,10 @@ def _compared(rec: Record, command: Vector, controller: Controller, logged: Vect
     figures = (logged, replayed, rms, maximum, resolution)
     head = say("The logged {torque} follows from command and velocity through this controller")
     found, placed = None, _of_positions(rec, controller, replayed)
+    limits = None if cascade_of(controller).torque_filters else controller.gains.limits
     for (step,) in velocity_steps([rec]):
         allowed = Allowed.of(rec, command, controller.gains, logged, step, placed)
-        if allowed(off, None if cascade_of(controller).torque_filters else controller.gains.limits):
+        if allowed(off, limits):
             known = say(" (its resolution is {:.2g} {N m})", resolution) if resolution > 0.0 else ""
             return Replay(*figures, True, "", np.nan, None, say("{}, to {:.1g} {N m}{}.", head, maximum, known))
         if pi is not None and rounded_command(off, command, rec.dt, pi):
@@ -124,7 +126,10 @@ def _compared(rec: Record, command: Vector, controller: Controller, logged: Vect
             measured = "{} up to white noise of {:.2g} {N m} rms: it is a measured {torque}, or a coarsely rounded one."
             text = say(measured, head, noise)
             return Replay(*figures, True, "", np.nan, None, text)
-        found = None if pi is None else explain(command, rec.velocity, rec.dt, pi, logged, allowed)
+        if pi is None:
+            found = _under_load(rec, controller, logged, allowed, limits)
+        else:
+            found = explain(command, rec.velocity, rec.dt, pi, logged, allowed)
         if found is not None:
             break
     if found is not None and found.cause == "initial_integral":
@@ -218,6 +223,26 @@ class Allowed:
         limited = (np.abs(logged) >= POLICY.at_limit * torque) | (np.abs(stored) >= POLICY.at_limit * integral)
         free = ~(limited[1:] | limited[:-1])
         return float(np.abs(np.diff(off))[free].max(initial=0.0)) <= self.jump
+
+
+def _under_load(
+    rec: Record, controller: Controller, logged: Vector, allowed: Allowed, limits: tuple[float, float] | None
+) -> Explanation | None:
+    """A record that begins under load: the same of a controller that is no bare PI; None where the torque does not follow so.
+
+    What stood in filters before the record, beside the load, is not known: the lines that remember it are left out.
+    """
+    start = stored_torque(rec, controller, driven=False)
+    if start == 0.0:
+        return None
+    cascade, known = cascade_of(controller), len(rec) - controller.ahead(rec.dt)
+    filtered = cascade.torque_filters or cascade.velocity_filters or cascade.command_filters
+    edge = min(POLICY.filter_memory // 4, known // 4) if filtered else 0  # no decision: a quarter, as at a start in motion
+    off = (logged - controller.torque_of(rec, stored=start))[edge:known]
+    if filtered:
+        start += float(np.median(off))
+    made = controller.torque_of(rec, stored=start)
+    return under_load(made, start) if allowed((logged - made)[edge:known], limits, edge) else None
 
 
 def _of_positions(rec: Record, controller: Controller, replayed: Vector) -> float:
