@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from gaident.models.made_torque import _first_level
 
 import gaident as ga
 from drive_rig import Plant, rig, run_drive, skip_without_library
@@ -14,6 +13,7 @@ from gaident.errors import ControllerError
 from gaident.identification.closed_loop import line_equation
 from gaident.identification.controller_numbers import with_estimates
 from gaident.identification.logged_torque import corrected, not_followed
+from gaident.models.made_torque import _first_level
 
 T, EVERY = 250e-6, 4
 DRIVE = ga.Cascade(ga.PI(0.3, 15.0), T, position=ga.P(30.0), velocity_feedforward=1.0)
