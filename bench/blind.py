@@ -68,6 +68,10 @@ from loop_cases import EVERY, LOOPS, loop_effects, loop_kind, loop_noise, loop_p
 
 NOISE_KINDS = ("white", "encoder", "coloured")
 GROUPS = ("clean", "effects", "sizes", "pairs", "outside", "encoder", "settled", "loops", "ramps", "sides", "ends", "measured")
+OTHER_SENSORS = {
+    "encoder": {"velocity_quantisation"},
+    "differenced": {"velocity_quantisation", "velocity_filter", "velocity_ripple"},  # a differenced angle knows no such velocity
+}  # encoder -> what hides in another sensor than it
 TORQUE_NOISE = (0.05, 0.1)  # of the rms of a measured torque
 LEVELS = ("coulomb_friction", "stribeck_friction", "asymmetric_friction", "presliding_friction", "lugre_friction")
 AT_THE_SHAFT = ("coulomb_friction", "stribeck_friction", "asymmetric_friction", "quadratic_drag", "unbalance", "cogging")
@@ -166,7 +170,7 @@ def loop_cells(number: int, group: str = "loops") -> Iterator[Cell]:
             possible = loop_effects(loop)
             for effects in ((), (possible[turn % len(possible)],)):
                 kind, encoder = (loop_kind(loop), "encoder") if group == "loops" else (ramp_kind(turn), "differenced")
-                noise = "white" if turn % 2 or "velocity_quantisation" in effects else encoder
+                noise = "white" if turn % 2 or {*effects} & OTHER_SENSORS[encoder] else encoder
                 yield Cell(group, effects, kind, noise, True, number, loop=loop, every=every)
 
 
@@ -176,10 +180,10 @@ def case_of(cell: Cell) -> tuple[ga.Record, ga.Record | None, ga.PI | ga.Cascade
     if cell.loop:
         rng = np.random.default_rng([cell.seed, zlib.crc32(" ".join((cell.loop, str(cell.every), *cell.effects)).encode())])
         two = True if {*cell.effects} & {*COUPLING, "extra_resonance"} else None
-        ramps = cell.kind in RAMPS  # then each case has an encoder of its own
-        noise = loop_noise(cell.noise, zlib.crc32(cell.key.encode()) if ramps else cell.seed)
-        plant = loop_plant(cell.loop, cell.every, rng, two, cell.kind if ramps else None)
-        return random_case(cell.seed, cell.effects, cell.kind, noise, cell.torque, cell.factor, plant, plant.placed)
+        ramps = cell.kind in RAMPS  # then each case has ramps and an encoder of its own
+        number = zlib.crc32(cell.key.encode()) if ramps else cell.seed
+        plant, noise = loop_plant(cell.loop, cell.every, rng, two, cell.kind if ramps else None), loop_noise(cell.noise, number)
+        return random_case(number, cell.effects, cell.kind, noise, cell.torque, cell.factor, plant, plant.placed)
     if cell.group in ("sides", "ends"):  # either end of one effect, and both, on the same drive
         rng = np.random.default_rng([cell.seed, zlib.crc32("".join(cell.effects[:1]).removesuffix(AT_LOAD).encode())])
         return random_case(cell.seed, cell.effects, cell.kind, cell.noise, cell.torque, cell.factor, two_masses(rng))

@@ -111,3 +111,12 @@ def test_ramps_begin_and_end_between_the_lines(blind: Any, loop: str) -> None:
         assert limit is None or np.abs(record.torque).max() == limit
         again = blind.case_of(cell)[0]
         assert again.digest == record.digest and again.digest != validation.digest
+
+
+def test_a_limit_that_hides_under_ramps_is_reached(blind: Any) -> None:
+    hidden = ("torque_saturation",)
+    cells = [cell for cell in blind.cells("ramps", 25, 1) if cell.effects == hidden and cell.every == 4]
+    assert len(cells) > 3
+    for cell in cells[:4]:
+        record, *_, truth = blind.case_of(cell)
+        assert np.mean(np.abs(record.torque) >= truth.effects["torque_saturation"]["limit"]) > 2e-3

@@ -318,6 +318,13 @@ def draw_effect(name: str, factor: float, plant: Plant, samples: int, rng: np.ra
     return drawn[name]
 
 
+def as_ramps_ask(hidden: dict[str, dict[str, float]], plant: Plant, command: Array) -> None:
+    """Make a limit of the torque the share of what these ramps ask for that it is of what a reversal at full speed does."""
+    if "torque_saturation" in hidden:
+        asked = float(np.abs(run_drive(plant, command).torque).max())
+        hidden["torque_saturation"]["limit"] *= asked / (3.7 * max(1.0, plant.kp / 0.0232))
+
+
 def stable(plant: Plant, effects: dict[str, dict[str, float]]) -> bool:
     """Whether the loop with its linear effects comes to rest at a level; a bare PI without such an effect does."""
     linear = {name: values for name, values in effects.items() if name in LINEAR}
@@ -395,6 +402,8 @@ def random_truth(
             name: draw_effect(name, factors[i] if factor is None else factor, now, samples, rng) for i, name in enumerate(effects)
         }
         commands = [command_for(kind, now, rng, other_order) for other_order in (False, True)]
+        if kind in RAMPS:
+            as_ramps_ask(hidden, now, commands[0])
         truth = Truth(
             effects=hidden, plant=now, kind=kind, noise=noise_now, factor=factor or (factors[0] if factors else 0.0), seed=seed,
             command=commands[0], validation_command=None if kind == "step" else commands[1], settle=settle,
