@@ -16,6 +16,7 @@ Every finished case is a line of the file: stop at will, start again and it goes
     settled  a load that the integrator carries before the record starts, torque logged
     loops    loops of servo drives, wholly known, at 125 us with the log every 1, 2, 4, 8 samples: clean, and the effects in turn
              (--loops, --every: only these; --effects none: only clean ones)
+    ramps    the same loops under ramps that begin and end between the lines of the log, trapezoids and S-shapes in turn
     sides    two masses, inertia ratio 0.3 to 10, multi-level, torque logged: clean, and every effect of the shaft at either end
     ends     the same drives, dry friction of one kind at both ends at once
     measured no controller: a torque that was measured, with white noise of 5 and 10 % of its rms; clean, and effects at the shaft
@@ -49,12 +50,28 @@ from json_lines import read, work
 
 import gaident as ga
 from blind_judge import describes_noise, ends_of, judge, with_ends
-from drive_cases import EFFECTS, KINDS, NOISE_EFFECTS, PAIRS, Truth, nominal_plants, random_case, random_plant, tuned, two_masses
+from drive_cases import (
+    EFFECTS,
+    KINDS,
+    NOISE_EFFECTS,
+    PAIRS,
+    RAMPS,
+    Truth,
+    nominal_plants,
+    random_case,
+    random_plant,
+    tuned,
+    two_masses,
+)
 from drive_rig import AT_LOAD, COUPLING, OUTSIDE, SHAFT
-from loop_cases import EVERY, LOOPS, loop_effects, loop_kind, loop_noise, loop_plant
+from loop_cases import EVERY, LOOPS, loop_effects, loop_kind, loop_noise, loop_plant, ramp_kind
 
 NOISE_KINDS = ("white", "encoder", "coloured")
-GROUPS = ("clean", "effects", "sizes", "pairs", "outside", "encoder", "settled", "loops", "sides", "ends", "measured")
+GROUPS = ("clean", "effects", "sizes", "pairs", "outside", "encoder", "settled", "loops", "ramps", "sides", "ends", "measured")
+OTHER_SENSORS = {
+    "encoder": {"velocity_quantisation"},
+    "differenced": {"velocity_quantisation", "velocity_filter", "velocity_ripple"},  # a differenced angle knows no such velocity
+}  # encoder -> what hides in another sensor than it
 TORQUE_NOISE = (0.05, 0.1)  # of the rms of a measured torque
 LEVELS = ("coulomb_friction", "stribeck_friction", "asymmetric_friction", "presliding_friction", "lugre_friction")
 AT_THE_SHAFT = ("coulomb_friction", "stribeck_friction", "asymmetric_friction", "quadratic_drag", "unbalance", "cogging")
@@ -128,6 +145,8 @@ def cells(group: str, cases: int, seed: int, limits: dict[tuple[str, str], float
             yield Cell(group, ("load_torque",), "multi", NOISE_KINDS[number % 3], True, number, settle=1500)
         elif group == "loops":
             yield from loop_cells(number)
+        elif group == "ramps":
+            yield from loop_cells(number, "ramps")
         elif group == "sides":
             for effect in ("", *(e for e in EFFECTS if e in SHAFT)):
                 for key in (effect, effect + AT_LOAD) if effect else ("",):
@@ -143,15 +162,16 @@ def cells(group: str, cases: int, seed: int, limits: dict[tuple[str, str], float
                     yield Cell(group, (effect,) if effect else (), "multi", "white", True, number, torque_noise=share)
 
 
-def loop_cells(number: int) -> Iterator[Cell]:
+def loop_cells(number: int, group: str = "loops") -> Iterator[Cell]:
     """Each loop at each clock of the log: once clean, once with an effect, which the numbers take in turn."""
     for loop in LOOPS:
         for every in EVERY:
             turn = number + zlib.crc32(f"{loop} {every}".encode())
             possible = loop_effects(loop)
             for effects in ((), (possible[turn % len(possible)],)):
-                noise = "white" if turn % 2 or "velocity_quantisation" in effects else "encoder"
-                yield Cell("loops", effects, loop_kind(loop), noise, True, number, loop=loop, every=every)
+                kind, encoder = (loop_kind(loop), "encoder") if group == "loops" else (ramp_kind(turn), "differenced")
+                noise = "white" if turn % 2 or {*effects} & OTHER_SENSORS[encoder] else encoder
+                yield Cell(group, effects, kind, noise, True, number, loop=loop, every=every)
 
 
 def case_of(cell: Cell) -> tuple[ga.Record, ga.Record | None, ga.PI | ga.Cascade | None, Truth]:
@@ -160,8 +180,10 @@ def case_of(cell: Cell) -> tuple[ga.Record, ga.Record | None, ga.PI | ga.Cascade
     if cell.loop:
         rng = np.random.default_rng([cell.seed, zlib.crc32(" ".join((cell.loop, str(cell.every), *cell.effects)).encode())])
         two = True if {*cell.effects} & {*COUPLING, "extra_resonance"} else None
-        plant, noise = loop_plant(cell.loop, cell.every, rng, two), loop_noise(cell.noise, cell.seed)
-        return random_case(cell.seed, cell.effects, cell.kind, noise, cell.torque, cell.factor, plant, plant.placed)
+        ramps = cell.kind in RAMPS  # then each case has ramps and an encoder of its own
+        number = zlib.crc32(cell.key.encode()) if ramps else cell.seed
+        plant, noise = loop_plant(cell.loop, cell.every, rng, two, cell.kind if ramps else None), loop_noise(cell.noise, number)
+        return random_case(number, cell.effects, cell.kind, noise, cell.torque, cell.factor, plant, plant.placed)
     if cell.group in ("sides", "ends"):  # either end of one effect, and both, on the same drive
         rng = np.random.default_rng([cell.seed, zlib.crc32("".join(cell.effects[:1]).removesuffix(AT_LOAD).encode())])
         return random_case(cell.seed, cell.effects, cell.kind, cell.noise, cell.torque, cell.factor, two_masses(rng))
@@ -267,9 +289,9 @@ def main() -> None:
     parser.add_argument(
         "--effects", nargs="+", default=None, help="of the groups, only cases that hide one of these; none: clean"
     )
-    parser.add_argument("--kinds", nargs="+", choices=KINDS, default=list(KINDS))
-    parser.add_argument("--loops", nargs="+", choices=list(LOOPS), default=["", *LOOPS], help="of the group loops")
-    parser.add_argument("--every", nargs="+", type=int, choices=EVERY, default=list(EVERY), help="of the group loops")
+    parser.add_argument("--kinds", nargs="+", choices=[*KINDS, *RAMPS], default=[*KINDS, *RAMPS])
+    parser.add_argument("--loops", nargs="+", choices=list(LOOPS), default=["", *LOOPS], help="of the groups loops and ramps")
+    parser.add_argument("--every", nargs="+", type=int, choices=EVERY, default=list(EVERY), help="of the groups loops and ramps")
     names = [plant.name for plant in nominal_plants()]
     parser.add_argument("--plants", nargs="+", choices=names, default=names, help="of --limits")
     parser.add_argument("--limit-with", default="blind_refit:limit", metavar="MODULE:FUNCTION")

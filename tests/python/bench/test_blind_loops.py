@@ -1,4 +1,4 @@
-"""The quick set of the group `loops` of bench/blind.py: drives in the loops that servo drives have, wholly known."""
+"""The quick set of the groups `loops` and `ramps` of bench/blind.py: drives in the loops that servo drives have, wholly known."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import pytest
 
 import gaident as ga
 from blind_judge import Judgement, judge
-from drive_cases import random_case
+from drive_cases import RAMPS, random_case
 from drive_rig import skip_without_library
 from gaident.identification.replay.driven_records import torque_driven
 from loop_cases import EVERY, LOOPS, loop_effects, loop_kind, loop_noise, loop_plant
@@ -80,3 +80,43 @@ def test_the_cells_take_every_loop_clean_and_the_effects_in_turn(blind: Any) -> 
     assert set(clean) == {(loop, every) for loop in LOOPS for every in EVERY} and len(set(clean.values())) == 1
     hidden = {(cell.loop, cell.every, *cell.effects) for cell in cells if cell.effects}
     assert hidden == {(loop, every, effect) for loop in LOOPS for every in EVERY for effect in loop_effects(loop)}
+
+
+def test_ramps_take_every_loop_both_shapes_and_both_noises(blind: Any) -> None:
+    cells = list(blind.cells("ramps", 4, 1))
+    assert len({cell.key for cell in cells}) == len(cells)
+    assert {cell.group for cell in cells} == {"ramps"}
+    for effects in (True, False):
+        some = [cell for cell in cells if bool(cell.effects) is effects]
+        assert {(cell.loop, cell.every) for cell in some} == {(loop, every) for loop in LOOPS for every in EVERY}
+        kinds = {(kind, noise) for kind in RAMPS for noise in ("white", "differenced")}
+        assert {(cell.kind, cell.noise) for cell in some} == kinds
+
+
+@pytest.mark.parametrize("loop", ["hold", "position"])
+def test_ramps_begin_and_end_between_the_lines(blind: Any, loop: str) -> None:
+    """On a line of the log an eighth of them would; the log has the lines alone, and the same key gives the same record."""
+    cells = [cell for cell in blind.cells("ramps", 4, 1) if cell.loop == loop and cell.every == 8 and not cell.effects]
+    assert {cell.kind for cell in cells} == set(RAMPS)
+    for cell in cells:
+        record, validation, controller, truth = blind.case_of(cell)
+        logged = record.command if record.position_command is None else record.position_command
+        assert validation is not None and np.array_equal(logged, truth.command[::8])
+        speed = np.diff(truth.command, prepend=0.0) / 125e-6 if truth.plant.placed else truth.command
+        moves = np.abs(np.diff(speed)) > 1e-6
+        begins, ends = (np.flatnonzero(np.diff(moves.astype(int)) == way) + 1 for way in (1, -1))
+        assert len(begins) == len(ends) > 15
+        assert all(np.mean(each % 8 != 0) > 0.6 and len(set(each % 8)) > 4 for each in (begins, ends))
+        limit = controller.velocity.torque_limit
+        assert limit is None or np.abs(record.torque).max() == limit
+        again = blind.case_of(cell)[0]
+        assert again.digest == record.digest and again.digest != validation.digest
+
+
+def test_a_limit_that_hides_under_ramps_is_reached(blind: Any) -> None:
+    hidden = ("torque_saturation",)
+    cells = [cell for cell in blind.cells("ramps", 25, 1) if cell.effects == hidden and cell.every == 4]
+    assert len(cells) > 3
+    for cell in cells[:4]:
+        record, *_, truth = blind.case_of(cell)
+        assert np.mean(np.abs(record.torque) >= truth.effects["torque_saturation"]["limit"]) > 2e-3

@@ -9,20 +9,23 @@ from __future__ import annotations
 import zlib
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 
 import gaident as ga
-from drive_rig import AT_LOAD, COUPLING, NOISES, Array, Noise, Plant, RanAwayError, between_lines, rig, run_drive
+from drive_rig import AT_LOAD, COUPLING, NOISES, Array, Noise, Plant, RanAwayError, between_lines, log_of, run_drive
 
 __all__ = [
     "EFFECTS",
     "KINDS",
     "NOISE_EFFECTS",
     "PAIRS",
+    "RAMPS",
     "Truth",
     "command_for",
     "draw_effect",
+    "level_command",
     "random_case",
     "random_plant",
     "two_masses",
@@ -75,15 +78,20 @@ PAIRS = tuple(
     if not {a, b} & {*NOISE_EFFECTS, "lugre_friction", *LATER} and not any(a in group and b in group for group in RELATED)
 )
 KINDS = ("multi", "step", "move")
+RAMPS = {"trapezoid": False, "s-shape": True}
+"""Kinds of command that a ramp generator makes, for loops with a clock of their own -> whether the acceleration is rounded."""
 
 STEP_SAMPLES, LONG_SAMPLES = 250, 3500
 LONG_TIME = 1.75  # s, the least of a long record under a cascade, whose log may have many lines a second
 SPEEDS = (1, 3, 5, 10, 20, 30, 40, 60, 80)  # rad/s
+SLOPES = (500.0, 10_000.0)  # rad/s2, the greatest of a ramp
+ROUNDED = (0.2, 0.5)  # of the time of an S-shaped ramp, in which its acceleration rises, and in which it falls
+RAMPED = 0.7  # of the time of a level, that the ramp to it takes at most
 
 
 @dataclass(frozen=True)
 class Truth:
-    """What is hidden in a case; `effects` as the drive has them, {} for a clean one."""
+    """What is hidden in a case; `effects` as the drive has them, {} for a clean one. Commands are at the controller's clock."""
 
     effects: dict[str, dict[str, float]]
     plant: Plant
@@ -149,12 +157,16 @@ def tuned(plant: Plant, rng: np.random.Generator, bandwidth: float | None = None
 
 
 def command_for(kind: str, plant: Plant, rng: np.random.Generator, other_order: bool = False) -> Array:
-    """A velocity command [rad/s]: one step, levels with reversals and dither, or point-to-point moves.
+    """A velocity command [rad/s]: one step, levels with reversals and dither, point-to-point moves, or one of RAMPS.
 
     Its sum, a position command [rad], for a drive with a position controller.
+    It is at the controller's clock; all but RAMPS are made at the lines of the log.
     """
+    if kind in RAMPS:
+        ticks = ramp_command(plant, rng, other_order, RAMPS[kind])
+        return np.cumsum(ticks) * (plant.dt / plant.log_every) if plant.placed else ticks
     command = {"step": step_command, "multi": level_command, "move": move_command}[kind](plant, rng, other_order)
-    return np.cumsum(command) * plant.dt if plant.placed else command
+    return between_lines(plant, np.cumsum(command) * plant.dt if plant.placed else command)
 
 
 def samples_of(kind: str, plant: Plant) -> int:
@@ -170,15 +182,20 @@ def step_command(plant: Plant, rng: np.random.Generator, other_order: bool) -> A
     return command
 
 
-def level_command(plant: Plant, rng: np.random.Generator, other_order: bool) -> Array:
-    """Twenty levels, slow ones together so that they settle; every other one with a PRBS worth 0.05 N m."""
+def levels_for(rng: np.random.Generator, other_order: bool) -> list[float]:
+    """Twenty levels with reversals, from rest to rest, slow ones together so that they settle [rad/s]."""
     groups = [list(rng.permutation(SPEEDS[:4])), list(rng.permutation(SPEEDS[4:]))]
     levels = [0.0]
     for group in reversed(groups) if other_order else groups:
         for speed in group:
             first = rng.choice([-1, 1])
             levels += [first * speed, -first * speed]
-    levels.append(0.0)
+    return [*levels, 0.0]
+
+
+def level_command(plant: Plant, rng: np.random.Generator, other_order: bool) -> Array:
+    """The levels, at the lines of the log; every other one with a PRBS worth 0.05 N m."""
+    levels = levels_for(rng, other_order)
     samples = samples_of("multi", plant)
     edges = np.linspace(0, samples, len(levels) + 1).astype(int)
     command = np.empty(samples)
@@ -194,6 +211,29 @@ def level_command(plant: Plant, rng: np.random.Generator, other_order: bool) -> 
             chip = np.arange(length) // clock
             chip = np.minimum(chip, length // clock - 1) if slower else chip
             command[edges[i] : edges[i + 1]] += 0.05 / plant.kp * chips[chip]
+    return command
+
+
+def ramp_command(plant: Plant, rng: np.random.Generator, other_order: bool, rounded: bool) -> Array:
+    """The levels, at the controller's clock; to each a ramp of its own slope that begins at any sample, and ends at any time.
+
+    x goes from 0 to 1 over the ramp; rounded: the acceleration rises over a share s of it, and falls over as much,
+
+        v = (x^2 - (x - s)^2 - (x - 1 + s)^2)/(2 s (1 - s)),  of each square only where its base is positive
+    """
+    levels = levels_for(rng, other_order)
+    samples, period = samples_of("multi", plant) * plant.log_every, plant.dt / plant.log_every
+    length, command = samples / len(levels), np.full(samples, levels[0])
+    share = float(rng.uniform(*ROUNDED)) if rounded else 0.0
+    for i, (before, level) in enumerate(pairwise(levels), start=1):
+        slope = float(np.exp(rng.uniform(*np.log(SLOPES))))
+        lasts = min(abs(level - before) / (slope * (1 - share) * period), RAMPED * length)  # samples
+        begins = round((i + rng.uniform(0, 1 - RAMPED)) * length)
+        x = np.clip((np.arange(samples) - begins) / lasts, 0.0, 1.0)
+        if rounded:
+            rises, held, falls = (np.maximum(x - late, 0.0) ** 2 for late in (0.0, share, 1 - share))
+            x = (rises - held - falls) / (2 * share * (1 - share))
+        command += (level - before) * x
     return command
 
 
@@ -278,6 +318,13 @@ def draw_effect(name: str, factor: float, plant: Plant, samples: int, rng: np.ra
     return drawn[name]
 
 
+def as_ramps_ask(hidden: dict[str, dict[str, float]], plant: Plant, command: Array) -> None:
+    """Make a limit of the torque the share of what these ramps ask for that it is of what a reversal at full speed does."""
+    if "torque_saturation" in hidden:
+        asked = float(np.abs(run_drive(plant, command).torque).max())
+        hidden["torque_saturation"]["limit"] *= asked / (3.7 * max(1.0, plant.kp / 0.0232))
+
+
 def stable(plant: Plant, effects: dict[str, dict[str, float]]) -> bool:
     """Whether the loop with its linear effects comes to rest at a level; a bare PI without such an effect does."""
     linear = {name: values for name, values in effects.items() if name in LINEAR}
@@ -300,7 +347,7 @@ def acts(truth: Truth) -> bool:
     if not truth.effects:
         return True
     try:
-        command = between_lines(truth.plant, truth.command)
+        command = truth.command
         whole = run_drive(truth.plant, command, truth.effects).velocity
         for name in set(truth.effects) - {"outliers"}:
             rest = {key: value for key, value in truth.effects.items() if key != name}
@@ -355,6 +402,8 @@ def random_truth(
             name: draw_effect(name, factors[i] if factor is None else factor, now, samples, rng) for i, name in enumerate(effects)
         }
         commands = [command_for(kind, now, rng, other_order) for other_order in (False, True)]
+        if kind in RAMPS:
+            as_ramps_ask(hidden, now, commands[0])
         truth = Truth(
             effects=hidden, plant=now, kind=kind, noise=noise_now, factor=factor or (factors[0] if factors else 0.0), seed=seed,
             command=commands[0], validation_command=None if kind == "step" else commands[1], settle=settle,
@@ -366,9 +415,10 @@ def random_truth(
 
 def records(truth: Truth, torque_logged: bool = True, position_logged: bool = False) -> tuple[ga.Record, ga.Record | None]:
     """The log and, with other noise, the validation log of a case."""
+    before = np.zeros(truth.settle * truth.plant.log_every)
     logs = [
-        rig(truth.plant, command, truth.effects, truth.noise, seed=2 * truth.seed + i, torque_logged=torque_logged,
-            position_logged=position_logged, settle=truth.settle, name=name)
+        log_of(truth.plant, np.concatenate([before, command]), truth.effects, truth.noise, seed=2 * truth.seed + i,
+               torque_logged=torque_logged, position_logged=position_logged, settle=truth.settle, name=name)
         for i, (command, name) in enumerate([(truth.command, truth.kind), (truth.validation_command, "validation")])
         if command is not None
     ]  # fmt: skip

@@ -358,24 +358,39 @@ def rig(
 
     Starts from rest with an empty integrator; `settle` lines at command 0 before it are not logged.
     """
+    ticks = between_lines(plant, np.concatenate([np.zeros(settle), np.asarray(command, dtype=np.float64)]))
+    return log_of(plant, ticks, effects, noise, seed, torque_logged, position_logged, settle, substeps, name)
+
+
+def log_of(
+    plant: Plant,
+    ticks: Array,
+    effects: Effects | None = None,
+    noise: Noise | str = "white",
+    seed: int = 0,
+    torque_logged: bool = True,
+    position_logged: bool = False,
+    settle: int = 0,
+    substeps: int = SUBSTEPS,
+    name: str = "",
+) -> ga.Record:
+    """The log of one run whose command changes at the controller's clock; its first `settle` lines are not logged."""
     noise = NOISES[noise] if isinstance(noise, str) else noise
     effects = effects or {}
     rng = np.random.default_rng(seed)
-    full = np.concatenate([np.zeros(settle), np.asarray(command, dtype=np.float64)])
     sensor = {"encoder": noise.encoder, "differenced": noise.differenced}
     every = plant.log_every
-    ticks = between_lines(plant, full)
     whole = run_drive(plant, ticks, effects, substeps=substeps, **sensor, **disturbances(noise, len(ticks), rng))
     log = Log(*(getattr(whole, each.name)[::every] for each in dataclass_fields(Log)))
-    velocity = log.velocity.copy()
+    velocity, command = log.velocity.copy(), ticks[::every][settle:]
     if "outliers" in effects:
         count = round(effects["outliers"]["fraction"] * len(command))
         hit = settle + rng.choice(len(command), count, replace=False)
         velocity[hit] += rng.choice([-1, 1], count) * rng.uniform(10, 60, count)
     return ga.Record(
         dt=plant.dt,
-        command=None if plant.placed else full[settle:],
-        position_command=full[settle:] if plant.placed else None,
+        command=None if plant.placed else command,
+        position_command=command if plant.placed else None,
         velocity=velocity[settle:],
         torque=log.torque[settle:] if torque_logged else None,
         position=log.position[settle:] - log.position[settle] if position_logged else None,

@@ -8,14 +8,18 @@ from dataclasses import replace
 import numpy as np
 
 import gaident as ga
-from drive_cases import EFFECTS, LATER, command_for, random_plant, stable
-from drive_rig import Noise, Plant, RanAwayError, between_lines, run_drive
+from drive_cases import EFFECTS, LATER, RAMPS, command_for, level_command, random_plant, stable
+from drive_rig import Array, Noise, Plant, RanAwayError, between_lines, run_drive
 
-__all__ = ["EVERY", "LOOPS", "industrial_plant", "loop_effects", "loop_kind", "loop_noise", "loop_plant"]
+__all__ = ["EVERY", "LOOPS", "industrial_plant", "loop_effects", "loop_kind", "loop_noise", "loop_plant", "ramp_kind"]
 
 PERIOD = 125e-6  # s, of the velocity controller
 EVERY = (1, 2, 4, 8)  # its samples to a line of the log
-ENCODER_BITS = (17, 21)  # lines of a turn: 2^17 to 2^20
+INDUSTRY_BITS = (17, 25)  # of an encoder's turn: 17 to 24
+ENCODERS = {"encoder": (17, 21), "differenced": INDUSTRY_BITS}  # noise -> lines of a turn: 2^17 to 2^20, and to 2^24
+OUT_OF_REACH = 1e6  # N m, a limit that is none
+LIMIT_SHARE = (0.4, 0.7)  # of the greatest torque that is asked for
+JOBS = 4  # commands of ramps that a limit is drawn from
 LIMITS = ("torque_saturation", "integrator_clamp", "command_rate_limit")
 
 
@@ -38,9 +42,25 @@ def notch(plant: Plant, rng: np.random.Generator) -> ga.Notch:
 
 def limit_for(plant: Plant, rng: np.random.Generator) -> float:
     """A torque limit [N m] of 0.4 to 0.7 of the greatest torque that the drive would ask for, in its loop or under a bare PI."""
-    line = command_for("multi", plant, np.random.default_rng(int(rng.integers(1 << 31))))
+    line = level_command(plant, np.random.default_rng(int(rng.integers(1 << 31))), False)
     free = plant if plant.cascade is not None else replace(plant, cascade=ga.Cascade(pi(plant), period=PERIOD))
-    return float(np.abs(run_drive(free, between_lines(free, line)).torque).max() * rng.uniform(0.4, 0.7))
+    return greatest(free, between_lines(free, line)) * rng.uniform(*LIMIT_SHARE)
+
+
+def greatest(plant: Plant, ticks: Array) -> float:
+    """The greatest torque that the drive asks for under this command [N m]."""
+    return float(np.abs(run_drive(plant, ticks).torque).max())
+
+
+def reached_on(kind: str, plant: Plant, rng: np.random.Generator) -> Plant:
+    """The drive with its torque limit, if it has one, where such commands reach it: of several the one that asks for least."""
+    if plant.cascade is None or plant.cascade.velocity.torque_limit is None:
+        return plant
+    velocity = plant.cascade.velocity
+    free = replace(plant, cascade=replace(plant.cascade, velocity=replace(velocity, torque_limit=OUT_OF_REACH)))
+    least = min(greatest(free, command_for(kind, free, rng)) for _ in range(JOBS))
+    limit = least * rng.uniform(*LIMIT_SHARE)
+    return replace(plant, cascade=replace(plant.cascade, velocity=replace(velocity, torque_limit=limit)))
 
 
 def hold(plant: Plant, rng: np.random.Generator) -> ga.Cascade:
@@ -90,6 +110,11 @@ def loop_kind(loop: str) -> str:
     return "move" if loop == "position" else "multi"
 
 
+def ramp_kind(turn: int) -> str:
+    """The kinds of ramps, each for two numbers, so that both have either noise."""
+    return list(RAMPS)[turn // 2 % len(RAMPS)]
+
+
 def loop_effects(loop: str) -> tuple[str, ...]:
     """What can hide in such a loop: no second limit where one acts, no rate limit behind a position controller."""
     without = LIMITS if loop in LIMITED else ("command_rate_limit",) if loop == "position" else ()
@@ -97,18 +122,23 @@ def loop_effects(loop: str) -> tuple[str, ...]:
 
 
 def loop_noise(name: str, seed: int) -> Noise | str:
-    """The noise of that name; an encoder is one of a drive, 2^17 to 2^20 lines a turn."""
-    if name != "encoder":
+    """The noise of that name; an encoder is one of a drive: 2^17 to 2^20 lines a turn, differenced 2^17 to 2^24."""
+    if name not in ENCODERS:
         return name
-    return Noise(white=0.0, encoder=2 * np.pi / 2.0 ** int(np.random.default_rng(seed).integers(*ENCODER_BITS)))
+    bits = int(np.random.default_rng(seed).integers(*ENCODERS[name]))
+    return Noise(white=0.0, encoder=2 * np.pi / 2.0**bits, differenced=name == "differenced")
 
 
-def loop_plant(loop: str, every: int, rng: np.random.Generator, two_masses: bool | None = None) -> Plant:
-    """A random drive in such a loop, its log at every `every`-th controller sample. Raises RuntimeError where none is stable."""
+def loop_plant(loop: str, every: int, rng: np.random.Generator, two_masses: bool | None = None, kind: str | None = None) -> Plant:
+    """A random drive in such a loop, its log at every `every`-th controller sample. Raises RuntimeError where none is stable.
+
+    kind: of the command that reaches its torque limit; None: levels.
+    """
     for _ in range(50):
         plant = replace(random_plant(rng, two_masses), dt=PERIOD * every)
         try:
             plant = replace(plant, cascade=LOOPS[loop](plant, rng))
+            plant = plant if kind is None else reached_on(kind, plant, rng)
         except RanAwayError:
             continue
         if stable(plant, {}):
@@ -119,7 +149,6 @@ def loop_plant(loop: str, every: int, rng: np.random.Generator, two_masses: bool
 RESONANCE = (60.0, 500.0)  # Hz
 INERTIA_RATIO = (0.3, 10.0)  # load over motor
 CURRENT_LOOP = (0.1e-3, 0.5e-3)  # s, its time constant
-INDUSTRY_BITS = (17, 25)  # of an encoder's turn: 17 to 24
 GAIN_MARGIN = 1.6  # that a commissioned drive has at least; with less its shaft rings through a whole record
 LIMITED_SHARE = 1 / 3  # of the drives without an anti-windup, those that reach a torque limit
 
