@@ -119,7 +119,9 @@ def measured_gains(
     named = list(at_controller.items())
     bare = stages[0].parameters.model(stages[0].x)
     # Not known to the identification: the velocity's age, and what the torque did between the lines of a slower log.
-    first, told = (bare, ()) if objective.data.slower or objective.data.age else linear(part)
+    # Where nothing was found, the linear model that was selected is the one that is judged.
+    own = objective.data.slower or objective.data.age or not (final.effects or at_controller)
+    first, told = (bare, ()) if own else linear(part)
     chain = [first]
     chain += [with_effects(bare, dict(named[:k])) for k in range(1, len(named) + 1)]
     chain += [with_effects(f.parameters.model(f.x), at_controller) for f in stages[1:]]

@@ -301,6 +301,25 @@ def test_a_cause_that_whitening_hid_is_one_by_the_errors_before_whitening(plain:
     assert costs[1] < POLICY.overrules * costs[0] and not small.space.hidden(small.fit(B), small.fit(A))
 
 
+def test_what_the_noise_of_a_measured_torque_makes_of_a_free_run_is_no_effect(monkeypatch: pytest.MonkeyPatch) -> None:
+    """It lets the velocity wander: a ramp explains much of that by chance, and by the independent samples it would count."""
+    monkeypatch.setitem(SHAPES, "a", lambda z: z[0] * S)
+    monkeypatch.setattr(Toy, "torque_response", lambda self, parameters, x, torques: np.cumsum(torques, axis=1))
+    monkeypatch.setattr(model_space, "noise_std", lambda torque: 0.01)
+
+    def worth(measured: bool, seed: int, size: float = 0.0) -> bool:
+        wander = 0.01 * np.cumsum(np.random.default_rng(seed).standard_normal(N))
+        bench = Bench({"b": (size,)}, extra=wander, plain=True, seed=seed, noise=0.01)
+        data = replace(bench.data, torque_measured=measured)
+        space = replace(bench.task, objective=Objective(data, np.ones(N), OutputErrors(100.0))).space()
+        return space.worth(bench.fit(B if size else A), bench.fit())
+
+    seeds = range(24)
+    assert sum(worth(False, seed) for seed in seeds) > 12, "taken for an effect"
+    assert not any(worth(True, seed) for seed in seeds)
+    assert all(worth(True, seed, 1.0) for seed in seeds), "what is there shows through that noise"
+
+
 def test_a_hidden_cause_counts_by_independent_samples() -> None:
     """Of too few of them the same cost says nothing; where errors are whitened they are those of the errors without the cause."""
     bench = Bench({"a": (0.3,)}, plain=True, noise=0.05)
