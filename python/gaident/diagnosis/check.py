@@ -211,7 +211,10 @@ def _of_diagnosis(mechanics: Mapping[str, Estimate], effects: Effects) -> dict[s
 
 
 def _of_regression(found: InverseDynamics) -> dict[str, Estimate]:
-    """Without what it could not try, and without gravity or a spring where the other of the two stands."""
+    """Without what it could not try, and without gravity or a spring where the other of the two stands.
+
+    In the units of a rotary axis, as all of a diagnosis is until it is shown.
+    """
     parameters = found.parameters
     rows = {"inertia": parameters["inertia"]}
     untold = found.terms_not_tried
@@ -226,7 +229,7 @@ def _of_regression(found: InverseDynamics) -> dict[str, Estimate]:
             rows[name] = parameters[key]
         elif not there and {"gravity": "gravity", "ground stiffness": "spring"}[name] not in untold:
             rows[name] = Estimate(0.0, 0.0, NONE[name])
-    return rows
+    return {name: replace(e, unit=NONE[name]) for name, e in rows.items()}
 
 
 def _is_gravity(term: Term) -> bool:
