@@ -161,6 +161,7 @@ def _of_the_filter(model: Model, filtered: FilteredRecords) -> float:
     """The force error of a model on records that it made itself [N m]; 0 where these miss the motion, and are others.
 
     The torques drive it, so that one that falls another way is no measure.
+    Its effects of the angle turn with the logged one, where there is one, and so they do where its motion is judged.
     """
     made = []
     try:
@@ -170,7 +171,7 @@ def _of_the_filter(model: Model, filtered: FilteredRecords) -> float:
             if not np.std(done.velocity - rec.velocity) < np.std(rec.velocity):
                 return 0.0
             made.append(rec.with_channels(velocity=done.velocity, position=None if rec.position is None else done.position))
-        own = replace(filtered, records=tuple(made))
+        own = replace(filtered, records=tuple(made), angles=tuple(rec.position for rec in filtered.records))
         return own.force_error(model, own.torques(model)).rms
     except GaidentError:
         return 0.0

@@ -76,6 +76,19 @@ def test_what_the_filter_leaves_of_a_right_model_is_no_error_of_it() -> None:
     assert wrong.force_error > 5.0 * wrong.force_floor  # type: ignore[operator]
 
 
+def test_what_the_filter_leaves_is_judged_at_the_angle_that_the_effects_turned_with() -> None:
+    """A torque that is 2 % too large carries the model's own angle away from the logged one, with which its gravity turns."""
+    rec = rig(PLANT, COMMAND, {"unbalance": SWING}, noise="none", position_logged=True)
+    assert rec.torque is not None
+    effects = {"unbalance": SWING}
+    right, larger = (
+        check_of(ga.Record(rec.dt, velocity=rec.velocity, torque=k * rec.torque, position=rec.position), **effects).after
+        for k in (1.0, 1.02)
+    )
+    assert right.force_floor is not None and larger.force_floor is not None and larger.force_error is not None
+    assert larger.force_floor < 2.0 * right.force_floor + 1e-6 and larger.force_floor < 0.2 * larger.force_error
+
+
 def test_a_run_that_misses_the_motion_measures_no_filter() -> None:
     """A pendulum under its own torque falls another way: what its model leaves there says nothing of the record."""
     rec = record(unbalance=SWING)
