@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gaident.data.formats.table import Column, LogTable
-from gaident.data.signals.wraps import Unwrapper, overflow
+from gaident.data.signals.wraps import Unwrapper, overflow, wrapped_words
 from gaident.data.wanted import Wanted
 from gaident.errors import ReadError
 
@@ -49,5 +49,5 @@ class Counters:
         if not wraps or self._column is None:
             return ()
         unit = f" {self._column.unit}" if self._column.unit else ""
-        times = "once" if wraps == 1 else f"{wraps} times"
-        return (f"The position wrapped {times}, by {period:.6g}{unit}, and was continued over these jumps.",)
+        assert period is not None
+        return (wrapped_words(wraps, period, unit),)

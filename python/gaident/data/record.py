@@ -24,6 +24,7 @@ from gaident.data.record_checks import (
     slice_bounds,
     texts,
     torque_kind,
+    unwrapped,
 )
 from gaident.data.signals.arrays import MINIMUM_SAMPLES, channel
 from gaident.data.signals.decimation import decimated, factor_of
@@ -66,7 +67,7 @@ class Record:
     torque : array_like, shape (n,), optional
         Motor torque u [N m].
     position : array_like, shape (n,), optional
-        Measured motor angle theta [rad].
+        Measured motor angle theta [rad]. One that wraps is continued where it jumps and the velocity does not; `notes` says so.
     name : str
         What reports call the record.
     position_command : array_like, shape (n,), optional
@@ -129,8 +130,8 @@ class Record:
             raise RecordError(f"name={name!r} is no text; give a str")
         given = {key: value for key, value in zip(CHANNELS, (command, velocity, torque, position, position_command), strict=True)}
         channels = {key: None if values is None else channel(values, key) for key, values in given.items()}
-        kind = torque_kind(torque_is, channels["torque"])
-        self._fill(sample_time(dt), equally_long(channels), name=str(name), torque_is=kind, notes=texts(notes))
+        kind, dt = torque_kind(torque_is, channels["torque"]), sample_time(dt)
+        self._fill(dt, channels, name=str(name), torque_is=kind, notes=(*texts(notes), *unwrapped(equally_long(channels), dt)))
 
     def _fill(self, dt: float, channels: Mapping[str, NDArray[np.float64] | None], **about: Any) -> None:
         """Set the fields of this frozen object, unchecked."""
@@ -184,7 +185,8 @@ class Record:
         period = self.dt if dt is None else sample_time(dt)
         kept = COMMANDED if channels["torque"] is None else self.torque_is
         kind = kept if torque_is is None else torque_kind(torque_is, channels["torque"])
-        made._fill(period, equally_long(channels), name=self.name, torque_is=kind, notes=self.notes)
+        notes = (*self.notes, *unwrapped(equally_long(channels), period, "position" in changed))
+        made._fill(period, channels, name=self.name, torque_is=kind, notes=notes)
         return made
 
     def channels(self) -> Iterator[tuple[str, NDArray[np.float64]]]:
@@ -357,8 +359,7 @@ class Record:
             Where the data are something else or of a newer schema.
         """
         check_schema(data, SCHEMA, SCHEMA_VERSION)
-        # no decision: a format: channels of its first version
-        missing = [key for key in ("dt", "name", *CHANNELS[:4]) if key not in data]
+        missing = [key for key in ("dt", "name", *CHANNELS[:4]) if key not in data]  # no decision: a format: its first version
         if missing:
             raise RecordError(f"the saved record lacks {', '.join(missing)}; save it again")
         # Early files contain neither of these, nor a position command.
@@ -388,8 +389,7 @@ class Record:
         return f"Record({label}{len(self)} samples, dt={self.dt:.6g} s, {self.duration:.4g} s; {channels})"
 
     def _repr_html_(self) -> str:
-        html: str = provided("record_html")(self)
-        return html
+        return str(provided("record_html")(self))
 
     def __reduce__(self) -> tuple[Any, tuple[Any, ...]]:
         # Arrays come out of a pickle writable; through the constructor they are checked and locked again.

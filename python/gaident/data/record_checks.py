@@ -10,8 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gaident.arguments import arg
+from gaident.axis import Text
 from gaident.checks import one_of
-from gaident.data.signals.arrays import MINIMUM_SAMPLES, positive_number
+from gaident.data.signals.arrays import MINIMUM_SAMPLES, channel, positive_number
+from gaident.data.signals.wraps import continued, wrapped_words
 from gaident.data.torque_kind import COMMANDED, TORQUE_KINDS
 from gaident.errors import RecordError
 
@@ -25,6 +27,7 @@ __all__ = [
     "slice_bounds",
     "texts",
     "torque_kind",
+    "unwrapped",
 ]
 
 HASH_BLOCK = 1 << 18  # no decision: memory; values of a block
@@ -53,6 +56,23 @@ def equally_long(channels: dict[str, NDArray[np.float64] | None]) -> dict[str, N
             "or, where they come from two clocks, bring two records together with align"
         )
     return channels
+
+
+def unwrapped(channels: dict[str, NDArray[np.float64] | None], dt: float, new: bool = True) -> tuple[str, ...]:
+    """What is said of a position that wraps, which is continued in its place among the channels; () of another one.
+
+    Its command goes with it, within half a range of the position.
+    new: whether the position is; one of a record was looked at when that was made.
+    """
+    position, command, velocity = (channels[key] for key in ("position", "position_command", "velocity"))
+    made = None if position is None or velocity is None or not new else continued(position, velocity, dt)
+    if made is None:
+        return ()
+    found, period, wraps = made
+    channels["position"] = channel(found, "position")
+    if command is not None:
+        channels["position_command"] = channel(command + period * np.round((found - command) / period), "position_command")
+    return (wrapped_words(wraps, period, Text(" rad", " m")),)
 
 
 def texts(notes: Sequence[str]) -> tuple[str, ...]:

@@ -313,7 +313,7 @@ def _mechanics(dia: Diagnosis, axis: str) -> list[str]:
     lines = [head, *table(rows)]
     if any(e.std is not None and e.std > 0.0 for e in dia.mechanics.values()):
         lines.append(f"  +- {SPREAD}")
-    if "resonance" not in dia.mechanics and len(dia.model.poles) > 1:
+    if not {"resonance", "ground_resonance"} & dia.mechanics.keys() and len(dia.model.poles) > 1:
         lines.append(f"  {_other_pair(dia.model)}")
     return lines
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import pickle
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +11,7 @@ from numpy.typing import NDArray
 
 import gaident as ga
 from drive_rig import Noise, Plant, rig
+from gaident.axis import said
 from gaident.data.signals.wraps import Unwrapper, overflow
 from gaident.errors import ReadError
 
@@ -120,6 +122,46 @@ def test_read_continues_a_position_and_results_say_so(tmp_path: Path) -> None:
     assert read.notes[0] in dia.notes
     idn = ga.identify(read, controller=PLANT.controller)
     assert read.notes[0] in idn.warnings
+
+
+@pytest.mark.parametrize("period", [TURN, 65536 / 4000 * TURN, 65536 / 8192 * TURN], ids=["turn", "16 bit, 4000", "16 bit, 8192"])
+@pytest.mark.parametrize("step", [0.0, TURN / 4000], ids=["exact", "counts"])
+def test_a_record_continues_a_position_that_its_velocity_goes_through(period: float, step: float) -> None:
+    rec = motion()
+    assert rec.position is not None
+    turned = 8.0 * rec.position  # through the range of 16 bits, too
+    turned = step * np.floor(turned / step) if step else turned
+    velocity = 8.0 * rec.velocity
+    raw = wrapped(turned / period * TURN, period, -0.5 * period)
+    made = ga.Record(rec.dt, velocity=velocity, torque=rec.torque, position=raw, notes=["first"])
+    assert made.position is not None and not made.position.flags.writeable
+    off = made.position - turned - np.mean(made.position - turned)
+    assert float(np.abs(off).max()) < 0.002 * period
+    assert made.notes[0] == "first" and f"by {period:.4g}"[:7] in made.notes[1] and "was continued" in made.notes[1]
+    assert said(made.notes[1], "linear") == made.notes[1].replace(" rad", " m")
+    again = made.with_channels(velocity=velocity + 1e-3)
+    assert again.notes == made.notes and np.array_equal(again.position, made.position)
+    ahead = np.concatenate([turned[4:], np.full(4, turned[-1])])  # a command that the axis follows 4 samples late
+    asked = wrapped(ahead / period * TURN, period, -0.5 * period)
+    driven = ga.Record(rec.dt, velocity=velocity, position=raw, position_command=asked)
+    assert driven.position is not None and driven.position_command is not None
+    np.testing.assert_allclose(driven.position_command - driven.position, ahead - turned, atol=0.002 * period)
+    given = rec.with_channels(velocity=velocity, position=raw)
+    assert given.position is not None and given.notes == made.notes[1:] and np.array_equal(given.position, made.position)
+    for same in (made[5:], ga.Record.from_dict(made.to_dict()), pickle.loads(pickle.dumps(made))):
+        assert same.notes == made.notes
+
+
+def test_a_record_leaves_a_position_as_it_is_where_nothing_wraps() -> None:
+    """One that is continuous, one that comes back at once, and one that its velocity follows over the jump."""
+    rec = motion()
+    assert rec.position is not None
+    spike = rec.position.copy()
+    spike[700] += 500.0
+    leap = 0.01 * np.arange(len(rec)) - 100.0 * (np.arange(len(rec)) > 900)
+    for position, velocity in ((rec.position, rec.velocity), (spike, rec.velocity), (leap, np.gradient(leap, rec.dt))):
+        made = ga.Record(rec.dt, velocity=velocity, torque=rec.torque, position=position)
+        assert made.notes == () and np.array_equal(made.position, position)
 
 
 def test_read_refuses_an_overflown_velocity(tmp_path: Path) -> None:

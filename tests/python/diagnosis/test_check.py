@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 from typing import Any
 
@@ -10,6 +11,7 @@ import pytest
 
 import gaident as ga
 from drive_rig import Plant, rig, skip_without_library
+from gaident.axis import said
 from gaident.diagnosis.check import Check, _of_the_filter, checked
 from gaident.diagnosis.gains import Gains
 from gaident.estimation.dataset import DataSet
@@ -76,6 +78,19 @@ def test_what_the_filter_leaves_of_a_right_model_is_no_error_of_it() -> None:
     assert wrong.force_error > 5.0 * wrong.force_floor  # type: ignore[operator]
 
 
+def test_what_the_filter_leaves_is_judged_at_the_angle_that_the_effects_turned_with() -> None:
+    """A torque that is 2 % too large carries the model's own angle away from the logged one, with which its gravity turns."""
+    rec = rig(PLANT, COMMAND, {"unbalance": SWING}, noise="none", position_logged=True)
+    assert rec.torque is not None
+    effects = {"unbalance": SWING}
+    right, larger = (
+        check_of(ga.Record(rec.dt, velocity=rec.velocity, torque=k * rec.torque, position=rec.position), **effects).after
+        for k in (1.0, 1.02)
+    )
+    assert right.force_floor is not None and larger.force_floor is not None and larger.force_error is not None
+    assert larger.force_floor < 2.0 * right.force_floor + 1e-6 and larger.force_floor < 0.2 * larger.force_error
+
+
 def test_a_run_that_misses_the_motion_measures_no_filter() -> None:
     """A pendulum under its own torque falls another way: what its model leaves there says nothing of the record."""
     rec = record(unbalance=SWING)
@@ -127,6 +142,23 @@ def test_a_difference_that_does_not_matter_is_no_disagreement() -> None:
     own, second, torque = check.after.force_error, check.force_error, check.after.torque_rms
     assert check.regression_better and own > 2.0 * max(second, check.after.force_floor)
     assert own - second < 0.05 * torque and check.notes == ()
+
+
+def test_a_small_difference_is_said_where_the_regression_of_a_right_model_has_it_not() -> None:
+    """An inertia that is 3 % wrong at 0.2 %; of the right one the regression is off by more than its deviation, too."""
+    rec = record(coulomb_friction=FRICTION)
+    sizes = ((3e-4, 1e-4), (3.09e-4, 2e-3))
+    right, wrong = (check_of(rec, inertia=J, share=share, coulomb_friction=FRICTION) for J, share in sizes)
+    c = rows(right)["inertia"]
+    assert abs(c.diagnosis.value - c.regression.value) > 3.0 * np.hypot(c.diagnosis.std, c.regression.std) and right.notes == ()
+    (note,) = wrong.notes
+    assert not any(c.differs for c in wrong.comparisons)
+    assert note.startswith("The inertia of the diagnosis is 0.000309 +- 6.2e-07 kg m^2, the inverse-dynamics regression")
+    assert "of both deviations" in note and re.search(r"2\.\d % apart", note)
+    assert re.search(r"made it says 0\.0003(09|1) kg m\^2", note)
+    assert said(note, "linear").startswith("The mass of the diagnosis is 0.000309 +- 6.2e-07 kg, ")
+    behind = check_of(rec, inertia=3.09e-4, share=2e-3, coulomb_friction=FRICTION, torque_dead_band={"width": 1e-4})
+    assert behind.notes == ()
 
 
 def test_friction_of_two_levels_is_compared_by_its_mean() -> None:

@@ -16,6 +16,7 @@ from gaident.diagnosis.experiments.excitation import excitation
 from gaident.errors import SettingsError
 from gaident.estimation.period import period_of_place
 from gaident.reporting.report import view_of
+from gaident.results.json_text import on_axis
 
 DT, N = 5e-3, 2000
 LOOP = ga.PI(kp=3000.0, ki=20000.0)  # N s/m, N/m
@@ -48,6 +49,15 @@ def test_dry_friction_is_named_and_gravity_by_the_angle_is_not_tried(diagnosis: 
     assert set(diagnosis.not_testable) >= PERIODIC and not PERIODIC & set(diagnosis.one_sided)
     assert diagnosis.regression is not None and diagnosis.regression.axis == "linear"
     assert not any(c.name == "gravity" for c in diagnosis.comparisons) and not any(c.differs for c in diagnosis.comparisons)
+
+
+def test_both_methods_are_compared_in_one_unit(diagnosis: ga.Diagnosis) -> None:
+    inside, shown = (
+        {c["name"]: (c["diagnosis"]["unit"], c["regression"]["unit"]) for c in data["comparisons"]}
+        for data in (diagnosis.to_dict(), on_axis(diagnosis.to_dict(), "linear"))
+    )
+    assert inside["inertia"] == ("kg m^2", "kg m^2") and inside["dry friction"] == ("N m", "N m")
+    assert shown["inertia"] == ("kg", "kg") and shown["dry friction"] == ("N", "N")
 
 
 def test_a_force_that_follows_the_place_gets_no_name_of_a_turn() -> None:

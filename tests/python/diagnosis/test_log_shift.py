@@ -55,6 +55,16 @@ def test_the_law_shows_which_channel_was_moved(plant: Plant, noise: str) -> None
     assert looked_at(found.records[0], plant)[0] == {}
 
 
+@pytest.mark.parametrize("channel", ["velocity", "command"])
+def test_where_a_shift_makes_the_torque_follow_no_other_sample_time_is_advised(channel: str) -> None:
+    rec = rig(RIGID, STEPS, FRICTION, "white").shifted(**{channel: 1})
+    asked = loop_of([rec], RIGID.controller)
+    driven = torque_driven([rec], RIGID.controller)
+    found = driving_of(driven.records, (), asked, driven, {driven.records[0].digest: rec})
+    assert found.moved.shifts == {rec.digest: {channel: -1}}
+    assert not any("period" in note for note in (*found.notes, *found.moved.notes))
+
+
 def test_what_is_no_shift_is_not_moved() -> None:
     """Delay, lag, filter, wrong gains, another rule of integration and limits are explained otherwise, or are the drive's."""
     rectangular = ga.PI(RIGID.kp + 0.5 * RIGID.ki * RIGID.dt, RIGID.ki)

@@ -369,6 +369,16 @@ def test_a_pair_that_does_not_swing_is_no_resonance() -> None:
     assert "a pair of poles at 194 Hz that is no shaft's" in summary(result)
 
 
+@pytest.mark.parametrize("pair", [(-3.0 + 22.4j, -3.0 - 22.4j), (-5.0, -60.0)])
+def test_the_pair_of_a_spring_to_the_ground_is_told_once(pair: tuple[complex, complex]) -> None:
+    result = fake()
+    result.mechanics = {name: result.mechanics[name] for name in ("inertia", "viscous_friction")}
+    result.mechanics["ground_resonance"] = ga.Estimate(3.569, 0.004, "Hz")
+    result.model = ga.Model(gain=500.0, poles=list(pair), zeros=[0.0])
+    text = summary(result)
+    assert "ground resonance" in text and "pair of poles" not in text
+
+
 def test_a_free_run_that_diverges_twice_has_no_share() -> None:
     assert step_words(math.nan) == "nothing (the free run diverges)"
     assert step_words(-2000.0) == "nothing (the free run is worse by far)"

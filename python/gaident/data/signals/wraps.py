@@ -9,6 +9,7 @@ to within the difference of the two; where it has a usual range (2^8 .. 2^32, 1,
 Where the steps beside it differ by more than half or are 0, as of an encoder at low speed, only a usual range counts.
 A position is continued: x + k M, k the wraps so far.
 A glitch, which jumps back at once, is no wrap. Nor is a jump of a rotor that moves by more than a quarter of M in a sample.
+Beside a velocity in the same unit the position has wrapped only where the continued one moves as that velocity says.
 """
 
 from __future__ import annotations
@@ -19,9 +20,10 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from gaident.axis import Text, say
 from gaident.policy.table import POLICY
 
-__all__ = ["Unwrapper", "overflow"]
+__all__ = ["Unwrapper", "continued", "overflow", "wrapped_words"]
 
 Vector = NDArray[np.float64]
 
@@ -90,6 +92,27 @@ class Unwrapper:
         period = min(near, key=lambda m: abs(m - period), default=period)
         rest = np.abs(d - period * np.round(d / period))
         return period if float(np.quantile(rest, POLICY.wrap_spared)) < POLICY.wrap_beside * period else None
+
+
+def continued(x: Vector, velocity: Vector, dt: float) -> tuple[Vector, float, int] | None:
+    """(a position made continuous, M, how often it wrapped) beside its velocity, sampled every dt [s]; None where nothing wraps.
+
+    A jump that the velocity has too is a motion.
+    """
+    one = Unwrapper()
+    with np.errstate(over="ignore", invalid="ignore"):
+        found = one.push(x)
+    if one.period is None:
+        return None
+    at = np.flatnonzero(np.abs(np.diff(found - x)) > 0.5 * one.period)  # no decision: rounding: a whole number of periods
+    off = np.diff(found)[at] - 0.5 * dt * (velocity[at] + velocity[at + 1])
+    return (found, one.period, one.wraps) if float(np.abs(off).max()) < POLICY.wrap_beside * one.period else None
+
+
+def wrapped_words(wraps: int, period: float, unit: str) -> Text:
+    """What was done to a position that wrapped; unit: of `period`, with a space before it, or nothing."""
+    times = "once" if wraps == 1 else f"{wraps} times"
+    return say("The position wrapped {}, by {:.6g}{}, and was continued over these jumps.", times, period, unit)
 
 
 def overflow(x: Vector) -> tuple[int, float] | None:

@@ -25,6 +25,7 @@ from gaident.diagnosis.selection.other_gains import OTHER_GAINS, OtherGains
 from gaident.diagnosis.selection.unlogged_form import UnloggedForm
 from gaident.identification.logged_torque import comparable, corrected, not_followed
 from gaident.identification.replay.driven_records import Driven
+from gaident.identification.replay.replay import replay
 from gaident.models.drive_torque import driven_by, straight_driven
 from gaident.results.estimate import Estimate
 from gaident.results.finding import Finding
@@ -178,7 +179,10 @@ def driving_of(
     moved = replace(moved, given={here: origin.get(rec.digest, rec) for here, rec in moved.given.items()})
     logged = as_logged(moved.records, pi)
     used = controller if bare_pi(controller) is None else logged.controller
-    return Driving(moved, used, logged, findings, (*asked.period_notes, *notes), doubts, numbers, limited, lag=lag, found=found)
+    # A torque that the law makes once channels are moved needs no other sample time.
+    if pi is None or any(replay(r, pi).follows is False for r in records if r.digest not in moved.shifts):
+        notes = (*asked.period_notes, *notes)
+    return Driving(moved, used, logged, findings, notes, doubts, numbers, limited, lag=lag, found=found)
 
 
 def _again(

@@ -144,17 +144,26 @@ def force_error(
 
 @dataclass(frozen=True, eq=False)
 class FilteredRecords:
-    """Records with their torque, from the sample `first` of each on, behind one filter: force errors of several models."""
+    """Records with their torque, from the sample `first` of each on, behind one filter: force errors of several models.
+
+    angles: with which the effects of the angle turn in a record, where that is not the motion's own (n,); None: it is.
+    """
 
     records: tuple[Record, ...]
     first: tuple[int, ...]
     cutoff_hz: float
     order: int = ORDER
+    angles: tuple[Vector | None, ...] | None = None
 
     @cached_property
     def motions(self) -> tuple[Motion, ...]:
         """The filtered motion of each record."""
-        return tuple(motion_of(rec, self.cutoff_hz, self.order) for rec in self.records)
+        given = self.angles or (None,) * len(self.records)
+        return tuple(map(self._motion, self.records, given))
+
+    def _motion(self, rec: Record, angle: Vector | None) -> Motion:
+        motion = motion_of(rec, self.cutoff_hz, self.order)
+        return motion if angle is None else replace(motion, position=low_passed(angle, rec.dt, self.cutoff_hz, self.order))
 
     def torques(self, model: Model | InverseDynamics | TorqueOf) -> list[tuple[Vector, Vector]]:
         """(logged minus needed torque, torque at the shaft) of each record, over its samples in motion [N m]."""
