@@ -1,4 +1,4 @@
-"""Clean drives whose torque was measured with noise: nothing is named, and the model that was selected is the one that is judged."""
+"""Clean drives whose torque was measured with noise: nothing is named, and the selected linear model is judged."""
 
 from __future__ import annotations
 
