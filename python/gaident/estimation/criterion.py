@@ -54,9 +54,19 @@ from numpy.typing import NDArray
 
 from gaident.policy.table import POLICY
 
-__all__ = ["Specification", "bic", "chi_square_bound", "cost_of", "effective_samples", "gained", "specification_statistic"]
+__all__ = [
+    "Specification",
+    "bic",
+    "chi_square_bound",
+    "cost_of",
+    "effective_samples",
+    "gained",
+    "gained_by_chance",
+    "specification_statistic",
+]
 
 Vector = NDArray[np.float64]
+Matrix = NDArray[np.float64]
 
 
 def bic(variance: float, information: float, numbers: int) -> float:
@@ -110,6 +120,20 @@ def effective_samples(*errors: Vector) -> float:
         spectral = lowest / (products[0] * sum(min(POLICY.spectrum_lines, len(e) // 2) * len(e) for e in errors) / count)
         memory = max(1.0 + 2.0 * swinging, spectral)  # no decision: a formula: as below
     return float(np.clip(count / memory, 1.0, count))  # no decision: a formula: variances of means of correlated samples
+
+
+def gained_by_chance(draws: Matrix, simpler: Matrix, fuller: Matrix, left: float) -> float:
+    """How much more of the squares of noise a fuller model explains than a simpler one, in the mean over draws of it.
+
+        mean(|P_1 v|^2 - |P_0 v|^2)
+
+    draws: v, one a row; simpler, fuller: orthonormal bases of the sensitivities of either, as rows.
+    left: what the fuller one leaves of the records; where draws leave more in the mean they are scaled to that.
+    """
+    first, second = (np.sum((draws @ basis.T) ** 2, axis=1) for basis in (simpler, fuller))
+    remains = float(np.mean(np.sum(draws**2, axis=1) - second))
+    scale = min(1.0, left / remains) if remains > 0.0 else 1.0
+    return scale * float(np.mean(second - first))
 
 
 class Specification(NamedTuple):

@@ -36,7 +36,16 @@ from gaident.models.simulate import simulate
 from gaident.models.simulate_many import simulate_values
 from gaident.models.starts import noise_std
 
-__all__ = ["ClosedLoop", "ObserverLoop", "OpenLoop", "Predictor", "coupling_response", "torque_noise_in", "twist"]
+__all__ = [
+    "ClosedLoop",
+    "ObserverLoop",
+    "OpenLoop",
+    "Predictor",
+    "coupling_response",
+    "torque_noise_draws",
+    "torque_noise_in",
+    "twist",
+]
 
 Vector = NDArray[np.float64]
 Matrix = NDArray[np.float64]
@@ -275,6 +284,16 @@ def torque_noise_in(mechanism: Model, records: Sequence[Record]) -> float:
         response = simulate(mechanism.mechanism, Record(rec.dt, torque=unit, velocity=np.zeros(len(rec))))
         power += noise_std(rec.torque) ** 2 * float(np.sum(np.cumsum(response**2)))
     return float(np.sqrt(power / max(count, 1)))
+
+
+def torque_noise_draws(predictor: Predictor, parameters: Parameterisation, x: Vector, noise: float, count: int) -> Matrix:
+    """What draws of the noise of measured torques make of the velocity of the model x, with noise of the velocity (count, n).
+
+    noise: standard deviation of that of the velocity [rad/s]; that of the torques is as in `torque_noise_in`.
+    """
+    sizes = np.concatenate([np.full(len(r), noise_std(r.torque)) for r in predictor.data.driven if r.torque is not None])
+    torques, velocities = np.random.default_rng(0).standard_normal((2, count, len(sizes)))
+    return predictor.torque_response(parameters, x, sizes * torques) + noise * velocities
 
 
 def twist(data: DataSet, parameters: Parameterisation, x: Vector) -> Vector:

@@ -305,7 +305,7 @@ def test_what_the_noise_of_a_measured_torque_makes_of_a_free_run_is_no_effect(mo
     """It lets the velocity wander: a ramp explains much of that by chance, and by the independent samples it would count."""
     monkeypatch.setitem(SHAPES, "a", lambda z: z[0] * S)
     monkeypatch.setattr(Toy, "torque_response", lambda self, parameters, x, torques: np.cumsum(torques, axis=1))
-    monkeypatch.setattr(model_space, "noise_std", lambda torque: 0.01)
+    monkeypatch.setattr(prediction, "noise_std", lambda torque: 0.01)
 
     def worth(measured: bool, seed: int, size: float = 0.0) -> bool:
         wander = 0.01 * np.cumsum(np.random.default_rng(seed).standard_normal(N))

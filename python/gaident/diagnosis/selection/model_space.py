@@ -22,21 +22,19 @@ from gaident.diagnosis.library.sides import called_of
 from gaident.diagnosis.library.terms import LIBRARY
 from gaident.diagnosis.selection.mechanisms import as_two_masses, resonance, swings
 from gaident.estimation import least_squares as ls
-from gaident.estimation.criterion import chi_square_bound, cost_of, effective_samples
-from gaident.estimation.dataset import DataSet, torque_in
+from gaident.estimation.criterion import chi_square_bound, cost_of, effective_samples, gained_by_chance
+from gaident.estimation.dataset import DataSet
 from gaident.estimation.global_search import evolved
 from gaident.estimation.noise_model import WHITE
 from gaident.estimation.objective import LOST, Fit, Hypothesis, Innovations, Objective, OutputErrors
-from gaident.estimation.prediction import ClosedLoop, ObserverLoop, OpenLoop, Predictor
+from gaident.estimation.prediction import ClosedLoop, ObserverLoop, OpenLoop, Predictor, torque_noise_draws
 from gaident.estimation.projection import orthonormal_rows
 from gaident.estimation.term import Term
-from gaident.models.starts import noise_std
 from gaident.policy.table import POLICY, Policy
 
 __all__ = ["Grown", "ModelSpace", "representative", "words"]
 
 Vector = NDArray[np.float64]
-Matrix = NDArray[np.float64]
 
 
 def words(effects: Iterable[str]) -> str:
@@ -189,30 +187,19 @@ class ModelSpace:
         """Whether a fuller model gains more than noise on a measured torque would give it by chance; true without one.
 
         That noise lets a free run wander slowly: a constant torque, or a wave of it, explains much of that.
-        Of a draw v of it, with noise of the velocity, a model explains |P v|^2, P the projection on its sensitivities.
-        What the fuller model explains more of these draws, in the mean and for each parameter more, is the unit of a chi-square.
-        The draws are at most as large as what the fuller model leaves.
+        What noise gives for each parameter more is the unit of a chi-square.
         """
         more = fuller.parameters.size - simpler.parameters.size
         if not self.data.torque_measured or self.whitens or more <= 0:
             return True
-        draws = self._torque_noise(fuller)
-        explained, power = [], np.sum(draws**2, axis=1)
-        for f in (simpler, fuller):
-            basis = orthonormal_rows(self.objective.whitened(self.objective.sensitivities(f.hypothesis, f.x)[0], WHITE))
-            explained.append(np.sum((draws @ basis.T) ** 2, axis=1))
-        left = float(np.mean(power - explained[1]))
-        scale = min(1.0, fuller.cost / left) if left > 0.0 else 1.0
-        by_chance = scale * float(np.mean(explained[1] - explained[0])) / more
+        objective = self.objective
+        rows = torque_noise_draws(
+            fuller.predictor, fuller.parameters, fuller.x, self.noise_beside(fuller), self.policy.noise_draws
+        )
+        sensitivities = (objective.sensitivities(f.hypothesis, f.x)[0] for f in (simpler, fuller))
+        bases = [orthonormal_rows(objective.whitened(J, WHITE)) for J in sensitivities]
+        by_chance = gained_by_chance(objective.whitened(rows, WHITE), *bases, fuller.cost) / more
         return simpler.cost - fuller.cost > by_chance * chi_square_bound(more, self.policy.noise_level)
-
-    def _torque_noise(self, fit: Fit) -> Matrix:
-        """Draws of the noise of the measured torques and of the velocity, as the errors of a fit, one a row."""
-        data, rng = self.data, np.random.default_rng(0)
-        sizes = np.concatenate([np.full(len(r), noise_std(torque_in(r))) for r in data.driven])
-        torques, velocities = rng.standard_normal((2, self.policy.noise_draws, len(sizes)))
-        rows = fit.predictor.torque_response(fit.parameters, fit.x, sizes * torques) + self.noise_beside(fit) * velocities
-        return self.objective.whitened(rows, WHITE)
 
     def generalises(self, simpler: Fit, fuller: Fit) -> bool:
         """Whether what a generalisation adds is that of the drive: more than the simulation is exact to, and in both loops."""
