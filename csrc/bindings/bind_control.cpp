@@ -47,7 +47,8 @@ Start start_named(const std::string& name) {
     throw std::invalid_argument("start must be 'rest', 'steady' or 'free', not '" + name + "'");
 }
 
-// The torque that a servo makes of measured signals, one after the other at its own clock; from rest, under a load that asks for `stored`.
+// The torque [N m] that a servo makes of measured signals, one after the other at its own clock, from rest.
+// stored [N m]: what its integrator and its torque filters hold before the first sample, for a load; 0 for none.
 RealArray servo_torque(const Clock& clock, const Loop& loop, const RealArray& source, const RealArray& velocity,
                        const RealArray& position, const RealArray& velocity_feedforward, const RealArray& torque_feedforward,
                        double stored) {

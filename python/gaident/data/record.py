@@ -185,7 +185,7 @@ class Record:
         period = self.dt if dt is None else sample_time(dt)
         kept = COMMANDED if channels["torque"] is None else self.torque_is
         kind = kept if torque_is is None else torque_kind(torque_is, channels["torque"])
-        notes = (*self.notes, *unwrapped(equally_long(channels), period, "position" in changed))
+        notes = tuple(dict.fromkeys((*self.notes, *unwrapped(equally_long(channels), period, "position" in changed))))
         made._fill(period, channels, name=self.name, torque_is=kind, notes=notes)
         return made
 

@@ -61,7 +61,7 @@ def equally_long(channels: dict[str, NDArray[np.float64] | None]) -> dict[str, N
 def unwrapped(channels: dict[str, NDArray[np.float64] | None], dt: float, new: bool = True) -> tuple[str, ...]:
     """What is said of a position that wraps, which is continued in its place among the channels; () of another one.
 
-    Its command goes with it, within half a range of the position.
+    Its command goes with it: continued over its own jumps, and within half a range of the position at the first sample.
     new: whether the position is; one of a record was looked at when that was made.
     """
     position, command, velocity = (channels[key] for key in ("position", "position_command", "velocity"))
@@ -71,8 +71,13 @@ def unwrapped(channels: dict[str, NDArray[np.float64] | None], dt: float, new: b
     found, period, wraps = made
     channels["position"] = channel(found, "position")
     if command is not None:
-        channels["position_command"] = channel(command + period * np.round((found - command) / period), "position_command")
+        channels["position_command"] = channel(_beside(np.unwrap(command, period=period), found, period), "position_command")
     return (wrapped_words(wraps, period, Text(" rad", " m")),)
+
+
+def _beside(command: NDArray[np.float64], position: NDArray[np.float64], period: float) -> NDArray[np.float64]:
+    """The command moved by whole ranges to the position, at the first sample."""
+    return command + period * float(np.round((position[0] - command[0]) / period))
 
 
 def texts(notes: Sequence[str]) -> tuple[str, ...]:

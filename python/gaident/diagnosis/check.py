@@ -267,8 +267,12 @@ def _verdict(own: float | None, second: float | None) -> Text:
 def _smaller(
     found: InverseDynamics, comparisons: Sequence[Comparison], model: Model, records: Sequence[Record]
 ) -> tuple[Text, ...]:
-    """Notes on differences that do not matter, but are sure, and more than what the regression says of a right model."""
-    if effects_before_the_shaft(model):
+    """Notes on differences that do not matter, but are sure, and more than what the regression says of a right model.
+
+    Not where a torque turns with a logged angle: in records of the model it turns with that angle, and its motion has another.
+    """
+    turning = any(r.position is not None for r in records) and any(e.row.turns for e in model.effects)
+    if effects_before_the_shaft(model) or turning:
         return ()
     asked = [c for c in comparisons if not c.differs and _deviations(c, 0.0) > POLICY.check_deviations]
     made = _made(model, records) if asked else None
@@ -292,9 +296,8 @@ def _deviations(c: Comparison, off: float) -> float:
 def _smaller_sentence(c: Comparison, own: Estimate) -> Text:
     mine, other = _both(c)
     text = (
-        "{}, the inverse-dynamics regression of the same records {}: {:.2g} % apart, {:.3g} of both deviations. Of records that "
-        "the model itself made it says {:.3g} {}, so that its filter is not the reason: the deviations do not contain what the "
-        "model lacks."
+        "{}, the inverse-dynamics regression of the same records {}: {:.2g} % apart, {:.3g} times both deviations together. Of "
+        "records that the model itself made it says {:.3g} {}, so that its filter is not the reason."
     )
     share = 100.0 * abs(c.diagnosis.value - c.regression.value) / max(abs(c.diagnosis.value), abs(c.regression.value))
     return say(text, mine.begun(), other, share, _deviations(c, 0.0), own.value, unit_text(own.unit))

@@ -122,18 +122,27 @@ def effective_samples(*errors: Vector) -> float:
     return float(np.clip(count / memory, 1.0, count))  # no decision: a formula: variances of means of correlated samples
 
 
-def gained_by_chance(draws: Matrix, simpler: Matrix, fuller: Matrix, left: float) -> float:
-    """How much more of the squares of noise a fuller model explains than a simpler one, in the mean over draws of it.
+def gained_by_chance(draws: Matrix, simpler: Matrix, fuller: Matrix, left: float, level: float) -> float:
+    """What a fuller model gains over a simpler one of noise alone, with this probability at most.
 
-        mean(|P_1 v|^2 - |P_0 v|^2)
+    Of a draw v a model explains |P v|^2.
+    The gain g = |P_1 v|^2 - |P_0 v|^2 is a sum of chi-squares of different weights.
+    One chi-square with its mean and its variance stands for it (Satterthwaite 1946):
 
-    draws: v, one a row; simpler, fuller: orthonormal bases of the sensitivities of either, as rows.
+        g ~ var(g)/(2 mean(g)) chi2_k,   k = 2 mean(g)^2/var(g)
+
+    draws: one a row; simpler, fuller: orthonormal bases of the sensitivities of either, as rows.
     left: what the fuller one leaves of the records; where draws leave more in the mean they are scaled to that.
+    0 where the simpler model explains as much of the noise as the fuller one: nothing is gained by chance.
     """
     first, second = (np.sum((draws @ basis.T) ** 2, axis=1) for basis in (simpler, fuller))
     remains = float(np.mean(np.sum(draws**2, axis=1) - second))
     scale = min(1.0, left / remains) if remains > 0.0 else 1.0
-    return scale * float(np.mean(second - first))
+    mean, variance = scale * float(np.mean(second - first)), scale**2 * float(np.var(second - first))
+    if not mean > 0.0 or not variance > 0.0:
+        return max(mean, 0.0)
+    unit = variance / (2.0 * mean)  # no decision: a formula: chi-square has twice its mean as variance
+    return unit * chi_square_bound(mean / unit, level)
 
 
 class Specification(NamedTuple):
@@ -155,7 +164,7 @@ def specification_statistic(whitened_estimate: float, output_estimate: float, in
     return float(information * np.log(whitened_estimate / output_estimate))
 
 
-def chi_square_bound(freedom: int, level: float) -> float:
+def chi_square_bound(freedom: float, level: float) -> float:
     """What chi-square with so many degrees of freedom exceeds with this probability.
 
     >>> round(chi_square_bound(1, 0.05), 2)

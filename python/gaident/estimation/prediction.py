@@ -291,9 +291,13 @@ def torque_noise_draws(predictor: Predictor, parameters: Parameterisation, x: Ve
 
     noise: standard deviation of that of the velocity [rad/s]; that of the torques is as in `torque_noise_in`.
     """
-    sizes = np.concatenate([np.full(len(r), noise_std(r.torque)) for r in predictor.data.driven if r.torque is not None])
-    torques, velocities = np.random.default_rng(0).standard_normal((2, count, len(sizes)))
-    return predictor.torque_response(parameters, x, sizes * torques) + noise * velocities
+    torques, velocities = [], []
+    for rec in predictor.data.records:
+        rng = np.random.default_rng(int(rec.digest, 16))  # the same draws of a record, whatever stands beside it
+        size = noise_std(rec.torque) if rec.torque is not None and rec.torque_is == MEASURED else 0.0
+        torques.append(size * rng.standard_normal((count, len(rec))))
+        velocities.append(noise * rng.standard_normal((count, len(rec))))
+    return predictor.torque_response(parameters, x, _side_by_side(torques)) + _side_by_side(velocities)
 
 
 def twist(data: DataSet, parameters: Parameterisation, x: Vector) -> Vector:

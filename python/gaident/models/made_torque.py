@@ -17,7 +17,8 @@ The mean that knows the level at the first line best has weights that fall from 
 
     mean((d(k+m) - d(k))^2) = m q + 2 r   for m = 1 and for a twentieth of the lines
 
-From the first line at a limit on, u_0 of a controller other than a bare PI is not that of the drive: these lines are left out.
+From the first line on at which either is at a limit, u_0 of a controller other than a bare PI is not that of the drive.
+These lines are left out.
 Of too few lines nothing is said.
 """
 
@@ -53,7 +54,8 @@ def stored_torque(rec: Record, controller: Controller, driven: bool = True) -> f
 
 def stored_beside(torque: Vector, made: Vector, controller: Controller) -> float:
     """The same of a torque, beside the one that is made from rest [N m] (n,)."""
-    at_limit = np.flatnonzero(np.abs(torque) >= POLICY.at_limit * controller.limits[0])
+    # From rest the controller may reach the limit where under the load it does not.
+    at_limit = np.flatnonzero(np.maximum(np.abs(torque), np.abs(made)) >= POLICY.at_limit * controller.limits[0])
     free = len(torque) if bare_pi(controller) is not None or not len(at_limit) else int(at_limit[0])
     off = torque[:free] - made[:free]
     return _first_level(off) if constant_beside(off, float(np.abs(torque).max())) else 0.0

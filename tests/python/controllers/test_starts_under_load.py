@@ -87,12 +87,16 @@ def test_the_simulated_loop_begins_as_the_drive_did(loop: str) -> None:
     assert np.sqrt(np.mean((ga.simulate(model, rec, cascade) - rec.velocity)[:200] ** 2)) > 0.3
 
 
+@pytest.mark.parametrize("load", [LOAD, -LOAD])
 @pytest.mark.parametrize("loop", [name for name in LOOPS if name != "position"])
-def test_the_replay_begins_under_the_load(loop: str) -> None:
-    """Behind a limit or a filter no constant makes up for it; the position loop's log has an angle of its own start."""
-    rec, cascade = case(loop, 1)
+def test_the_replay_begins_under_the_load(loop: str, load: float) -> None:
+    """Behind a limit or a filter no constant makes up for it; the position loop's log has an angle of its own start.
+
+    From rest the controller reaches its limit earlier, or where it does not under the load.
+    """
+    rec, cascade = case(loop, 1, load)
     said = replay(rec, cascade)
-    assert said.follows and said.cause == "initial_integral" and said.value == pytest.approx(LOAD, rel=1e-3), said.sentence
+    assert said.follows and said.cause == "initial_integral" and said.value == pytest.approx(load, rel=1e-3), said.sentence
     assert not replay(rec, replace(cascade, velocity=replace(cascade.velocity, kp=1.1 * KP))).follows
 
 

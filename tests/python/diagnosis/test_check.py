@@ -154,7 +154,7 @@ def test_a_small_difference_is_said_where_the_regression_of_a_right_model_has_it
     (note,) = wrong.notes
     assert not any(c.differs for c in wrong.comparisons)
     assert note.startswith("The inertia of the diagnosis is 0.000309 +- 6.2e-07 kg m^2, the inverse-dynamics regression")
-    assert "of both deviations" in note and re.search(r"2\.\d % apart", note)
+    assert "times both deviations" in note and re.search(r"2\.\d % apart", note)
     assert re.search(r"made it says 0\.0003(09|1) kg m\^2", note)
     assert said(note, "linear").startswith("The mass of the diagnosis is 0.000309 +- 6.2e-07 kg, ")
     behind = check_of(rec, inertia=3.09e-4, share=2e-3, coulomb_friction=FRICTION, torque_dead_band={"width": 1e-4})

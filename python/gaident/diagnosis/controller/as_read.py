@@ -43,9 +43,9 @@ def as_read(recorded: Sequence[Record], cleaned: Sequence[Record], controller: C
 
 
 def _replay_error(rec: Record, controller: Controller) -> float:
-    """Mean square of logged minus replayed torque [(N m)^2]."""
+    """Variance of logged minus replayed torque [(N m)^2]: a load that was there before the record adds a constant."""
     assert rec.torque is not None
-    return float(np.mean((rec.torque - controller.torque_of(rec)) ** 2))
+    return float(np.var(rec.torque - controller.torque_of(rec)))
 
 
 def outliers_of_the_log(records: Sequence[Record], controller: Controller | None) -> tuple[tuple[Record, ...], tuple[Lines, ...]]:

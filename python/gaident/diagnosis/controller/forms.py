@@ -213,7 +213,8 @@ def _shown(records: Sequence[Record], law: Law, given: PI, candidates: Sequence[
             if not white_noise(left, rec.torque):
                 return None
         off.append(left)
-    before = [r.torque - Cascade(given).torque_of(r) for r in records if r.torque is not None]
+    plain, pairs = Cascade(given), zip(records, starts, strict=True)
+    before = [r.torque - plain.torque_of(r, stored=float(start)) for r, start in pairs if r.torque is not None]
     return Shown(
         controller=controller,
         numbers=named(best, numbers, filters, cov, law.period),

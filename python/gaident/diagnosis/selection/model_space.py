@@ -22,7 +22,7 @@ from gaident.diagnosis.library.sides import called_of
 from gaident.diagnosis.library.terms import LIBRARY
 from gaident.diagnosis.selection.mechanisms import as_two_masses, resonance, swings
 from gaident.estimation import least_squares as ls
-from gaident.estimation.criterion import chi_square_bound, cost_of, effective_samples, gained_by_chance
+from gaident.estimation.criterion import cost_of, effective_samples, gained_by_chance
 from gaident.estimation.dataset import DataSet
 from gaident.estimation.global_search import evolved
 from gaident.estimation.noise_model import WHITE
@@ -187,19 +187,20 @@ class ModelSpace:
         """Whether a fuller model gains more than noise on a measured torque would give it by chance; true without one.
 
         That noise lets a free run wander slowly: a constant torque, or a wave of it, explains much of that.
-        What noise gives for each parameter more is the unit of a chi-square.
+        Where the command drives the models, in a loop or through a replayed controller, that noise is not in their errors.
         """
-        more = fuller.parameters.size - simpler.parameters.size
-        if not self.data.torque_measured or self.whitens or more <= 0:
+        driven = not fuller.predictor.closed and not any(t.in_controller for t in fuller.parameters.terms)
+        larger = fuller.parameters.size > simpler.parameters.size
+        if not (self.data.torque_measured and driven and larger) or self.whitens:
             return True
         objective = self.objective
         rows = torque_noise_draws(
             fuller.predictor, fuller.parameters, fuller.x, self.noise_beside(fuller), self.policy.noise_draws
         )
         sensitivities = (objective.sensitivities(f.hypothesis, f.x)[0] for f in (simpler, fuller))
-        bases = [orthonormal_rows(objective.whitened(J, WHITE)) for J in sensitivities]
-        by_chance = gained_by_chance(objective.whitened(rows, WHITE), *bases, fuller.cost) / more
-        return simpler.cost - fuller.cost > by_chance * chi_square_bound(more, self.policy.noise_level)
+        less, more = (orthonormal_rows(objective.whitened(J, WHITE)) for J in sensitivities)
+        by_chance = gained_by_chance(objective.whitened(rows, WHITE), less, more, fuller.cost, self.policy.noise_level)
+        return simpler.cost - fuller.cost > by_chance
 
     def generalises(self, simpler: Fit, fuller: Fit) -> bool:
         """Whether what a generalisation adds is that of the drive: more than the simulation is exact to, and in both loops."""

@@ -101,7 +101,9 @@ class Repeated(SideMoves):
         if other.parameters.kind == fit.parameters.kind and set(other.effects) - {name} == set(short.effects):
             longer = short.extended(other.parameters.term(name)).driven_by(other.predictor)
             start = short.parameters.inserted(x, other.x[other.parameters.slot(name)])
-            other = min((other, self.refitted(longer, start, self.policy.long)), key=self.score)
+            beside = self.refitted(longer, start, self.policy.long)
+            if beside.cost < WORST and is_mechanism(beside.parameters, beside.x) and self.swings(beside):
+                other = min((other, beside), key=self.score)
         return self.deepened(other) if self.score(other) < self.score(fit) + reach else other
 
     def in_other_series(self, hypothesis: Hypothesis, x: Vector) -> list[tuple[Hypothesis, Vector]]:

@@ -42,6 +42,7 @@ def rivals_of(space: Moves, final: Fit, effect: str, equivalent: Collection[str]
     if final.impacts and not space.quiet(final):
         reach = space.policy.rival_reach * gain
         others = [space.in_its_place(final, term, f, reach) for f in others]
+        others = [f for f in others if _only_new(f, final)]  # a search may have made another model of it
     for f in sorted(others, key=space.score):
         other = f.parameters.term(_only_new(f, final))
         behind = f.bic - final.bic
