@@ -12,7 +12,7 @@ from scipy.stats import chi2
 
 import gaident as ga
 from gaident.estimation import least_squares as ls
-from gaident.estimation.criterion import bic, chi_square_bound, effective_samples, specification_statistic
+from gaident.estimation.criterion import bic, chi_square_bound, effective_samples, gained_by_chance, specification_statistic
 from gaident.estimation.dataset import DataSet
 from gaident.estimation.noise_model import WHITE
 from gaident.estimation.objective import Fit, Hypothesis, Objective, OutputErrors
@@ -180,3 +180,20 @@ def test_output_errors_count_their_independent_samples() -> None:
     assert objective.under(OutputErrors(12.5)).information == 12.5
     assert objective.under(OutputErrors(1e9)).information == objective.count, "no more than there are"
     assert objective.under(OutputErrors(12.5)).noise_of(np.sin(np.arange(200.0)), False) is WHITE
+
+
+def test_what_noise_gives_a_fuller_model_by_chance() -> None:
+    """White noise: chi-square. What wanders gives a slow column more; what the model leaves bounds it."""
+    rng, level = np.random.default_rng(5), 1e-3
+    white = rng.standard_normal((2000, 50))
+    simpler, fuller = np.eye(50)[:1], np.eye(50)[:4]
+    assert gained_by_chance(white, simpler, fuller, np.inf, level) == pytest.approx(chi_square_bound(3, level), rel=0.1)
+    assert gained_by_chance(white, fuller, simpler, np.inf, level) <= 0.0
+    assert gained_by_chance(white, simpler, simpler, np.inf, level) == 0.0
+    half = gained_by_chance(white, simpler, fuller, 23.0, level)  # of the 46 that the draws leave
+    assert half == pytest.approx(0.5 * chi_square_bound(3, level), rel=0.1)
+    # One column of large weight beside one of little is no chi-square of two.
+    weights = np.array([3.0, 0.3, *np.ones(48)])
+    gains = np.sum((weights[:2] * rng.standard_normal((200000, 2))) ** 2, axis=1)
+    told = gained_by_chance(weights * white, np.zeros((0, 50)), np.eye(50)[:2], np.inf, level)
+    assert told == pytest.approx(np.quantile(gains, 1.0 - level), rel=0.15)
