@@ -238,10 +238,10 @@ def _under_load(
     cascade, known = cascade_of(controller), len(rec) - controller.ahead(rec.dt)
     filtered = cascade.torque_filters or cascade.velocity_filters or cascade.command_filters
     edge = min(POLICY.filter_memory // 4, known // 4) if filtered else 0  # no decision: a quarter, as at a start in motion
-    off = (logged - controller.torque_of(rec, stored=start))[edge:known]
-    if filtered:
-        start += float(np.median(off))
     made = controller.torque_of(rec, stored=start)
+    if filtered:
+        start += float(np.median((logged - made)[edge:known]))
+        made = controller.torque_of(rec, stored=start)
     return under_load(made, start) if allowed((logged - made)[edge:known], limits, edge) else None
 
 
