@@ -17,6 +17,7 @@ Every finished case is a line of the file: stop at will, start again and it goes
     loops    loops of servo drives, wholly known, at 125 us with the log every 1, 2, 4, 8 samples: clean, and the effects in turn
              (--loops, --every: only these; --effects none: only clean ones)
     ramps    the same loops under ramps that begin and end between the lines of the log, trapezoids and S-shapes in turn
+    jumps    the same loops under a command that jumps between the lines of the log
     sides    two masses, inertia ratio 0.3 to 10, multi-level, torque logged: clean, and every effect of the shaft at either end
     ends     the same drives, dry friction of one kind at both ends at once
     measured no controller: a torque that was measured, with white noise of 5 and 10 % of its rms; clean, and effects at the shaft
@@ -51,11 +52,11 @@ from json_lines import read, work
 import gaident as ga
 from blind_judge import describes_noise, ends_of, judge, with_ends
 from drive_cases import (
+    ANYWHERE,
     EFFECTS,
     KINDS,
     NOISE_EFFECTS,
     PAIRS,
-    RAMPS,
     Truth,
     nominal_plants,
     random_case,
@@ -67,7 +68,10 @@ from drive_rig import AT_LOAD, COUPLING, OUTSIDE, SHAFT
 from loop_cases import EVERY, LOOPS, loop_effects, loop_kind, loop_noise, loop_plant, ramp_kind
 
 NOISE_KINDS = ("white", "encoder", "coloured")
-GROUPS = ("clean", "effects", "sizes", "pairs", "outside", "encoder", "settled", "loops", "ramps", "sides", "ends", "measured")
+GROUPS = (
+    *("clean", "effects", "sizes", "pairs", "outside", "encoder", "settled"),
+    *("loops", "ramps", "jumps", "sides", "ends", "measured"),
+)
 OTHER_SENSORS = {
     "encoder": {"velocity_quantisation"},
     "differenced": {"velocity_quantisation", "velocity_filter", "velocity_ripple"},  # a differenced angle knows no such velocity
@@ -143,10 +147,8 @@ def cells(group: str, cases: int, seed: int, limits: dict[tuple[str, str], float
             yield Cell(group, (), "multi", "differenced", bool(number % 2), number)
         elif group == "settled":
             yield Cell(group, ("load_torque",), "multi", NOISE_KINDS[number % 3], True, number, settle=1500)
-        elif group == "loops":
-            yield from loop_cells(number)
-        elif group == "ramps":
-            yield from loop_cells(number, "ramps")
+        elif group in ("loops", "ramps", "jumps"):
+            yield from loop_cells(number, group)
         elif group == "sides":
             for effect in ("", *(e for e in EFFECTS if e in SHAFT)):
                 for key in (effect, effect + AT_LOAD) if effect else ("",):
@@ -162,14 +164,15 @@ def cells(group: str, cases: int, seed: int, limits: dict[tuple[str, str], float
                     yield Cell(group, (effect,) if effect else (), "multi", "white", True, number, torque_noise=share)
 
 
-def loop_cells(number: int, group: str = "loops") -> Iterator[Cell]:
+def loop_cells(number: int, group: str) -> Iterator[Cell]:
     """Each loop at each clock of the log: once clean, once with an effect, which the numbers take in turn."""
     for loop in LOOPS:
         for every in EVERY:
             turn = number + zlib.crc32(f"{loop} {every}".encode())
             possible = loop_effects(loop)
             for effects in ((), (possible[turn % len(possible)],)):
-                kind, encoder = (loop_kind(loop), "encoder") if group == "loops" else (ramp_kind(turn), "differenced")
+                kind, encoder = (loop_kind(loop), "encoder") if group == "loops" else (ANYWHERE[-1], "differenced")
+                kind = ramp_kind(turn) if group == "ramps" else kind
                 noise = "white" if turn % 2 or {*effects} & OTHER_SENSORS[encoder] else encoder
                 yield Cell(group, effects, kind, noise, True, number, loop=loop, every=every)
 
@@ -180,9 +183,9 @@ def case_of(cell: Cell) -> tuple[ga.Record, ga.Record | None, ga.PI | ga.Cascade
     if cell.loop:
         rng = np.random.default_rng([cell.seed, zlib.crc32(" ".join((cell.loop, str(cell.every), *cell.effects)).encode())])
         two = True if {*cell.effects} & {*COUPLING, "extra_resonance"} else None
-        ramps = cell.kind in RAMPS  # then each case has ramps and an encoder of its own
-        number = zlib.crc32(cell.key.encode()) if ramps else cell.seed
-        plant, noise = loop_plant(cell.loop, cell.every, rng, two, cell.kind if ramps else None), loop_noise(cell.noise, number)
+        own = cell.kind in ANYWHERE  # then each case has a command and an encoder of its own
+        number = zlib.crc32(cell.key.encode()) if own else cell.seed
+        plant, noise = loop_plant(cell.loop, cell.every, rng, two, cell.kind if own else None), loop_noise(cell.noise, number)
         return random_case(number, cell.effects, cell.kind, noise, cell.torque, cell.factor, plant, plant.placed)
     if cell.group in ("sides", "ends"):  # either end of one effect, and both, on the same drive
         rng = np.random.default_rng([cell.seed, zlib.crc32("".join(cell.effects[:1]).removesuffix(AT_LOAD).encode())])
@@ -289,7 +292,7 @@ def main() -> None:
     parser.add_argument(
         "--effects", nargs="+", default=None, help="of the groups, only cases that hide one of these; none: clean"
     )
-    parser.add_argument("--kinds", nargs="+", choices=[*KINDS, *RAMPS], default=[*KINDS, *RAMPS])
+    parser.add_argument("--kinds", nargs="+", choices=[*KINDS, *ANYWHERE], default=[*KINDS, *ANYWHERE])
     parser.add_argument("--loops", nargs="+", choices=list(LOOPS), default=["", *LOOPS], help="of the groups loops and ramps")
     parser.add_argument("--every", nargs="+", type=int, choices=EVERY, default=list(EVERY), help="of the groups loops and ramps")
     names = [plant.name for plant in nominal_plants()]

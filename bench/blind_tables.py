@@ -11,7 +11,7 @@ import numpy as np
 from scipy.stats import beta
 
 from blind_judge import CLASSES, DRIVERS, EQUIVALENT
-from drive_cases import EFFECTS, KINDS, NOISE_EFFECTS, RAMPS
+from drive_cases import ANYWHERE, EFFECTS, KINDS, NOISE_EFFECTS
 from drive_rig import AT_LOAD, OUTSIDE
 
 Line = dict[str, Any]
@@ -250,7 +250,7 @@ def loop_table(lines: list[Line]) -> str:
 
 def seconds_table(lines: list[Line]) -> str:
     rows = []
-    for kind in (*KINDS, *RAMPS):
+    for kind in (*KINDS, *ANYWHERE):
         times = [x["seconds"] for x in lines if x["cell"]["kind"] == kind]
         if times:
             rows.append([kind, len(times), *(f"{np.percentile(times, q):.2f}" for q in (50, 95, 100))])
@@ -336,6 +336,7 @@ def report(lines: list[Line]) -> str:
     add("A load settled before the record", groups.get("settled", []), effect_table)
     add("Loops of servo drives, wholly known", groups.get("loops", []), loop_table)
     add("Loops of servo drives under ramps that begin between the lines", groups.get("ramps", []), loop_table)
+    add("Loops of servo drives under jumps between the lines", groups.get("jumps", []), loop_table)
     add("Ends of an elastic shaft", groups.get("sides", []), sides_table)
     add("Dry friction at both ends of an elastic shaft", groups.get("ends", []), ends_table)
     add("A measured torque that drives the axis", groups.get("measured", []), measured_table)

@@ -116,7 +116,7 @@ def loop(count: int, seed: int) -> list[Case]:
 
 
 def slower(count: int, seed: int) -> list[Case]:
-    cells = [c for n in range(count) for c in blind.loop_cells(seed * 1_000_000 + n)]
+    cells = [c for n in range(count) for c in blind.loop_cells(seed * 1_000_000 + n, "loops")]
     return slower_forms(count, seed) + [Case("slower", c.key, c) for c in cells if c.every == EVERY and c.loop in SLOW_LOOPS]
 
 

@@ -283,6 +283,8 @@ class Cascade(Controller):
         source, every = self.command_of(log), self.log_every(log.dt)
         if every == 1 or source is None or self.limited or self.friction_feedforward != 0.0:
             return False
+        if self.acceleration_feedforward != 0.0 and self.source_of(log) is not source:
+            return False  # of what the command did between the lines the equation takes the mean alone
         if self.position is not None:
             at_lines = self.interpolation == "straight" and every % self.position_every(log.dt) == 0
             fits = at_lines and self.acceleration_feedforward == 0.0
@@ -293,11 +295,12 @@ class Cascade(Controller):
 
     def line_record(self, log: LoopSignals) -> _core.Record:
         """See `Controller`."""
-        source, placed = self.command_of(log), self.position is not None
-        assert source is not None
+        source, between, placed = self.command_of(log), self.source_of(log), self.position is not None
+        assert source is not None and between is not None
         start = float(log.position[0]) if placed and log.position is not None else self.start_angle(source)
         feed = self.velocity_feedforward, self.acceleration_feedforward
-        return core.line_record(log.dt, source - start, log.velocity, self.log_every(log.dt), placed, *feed)
+        known = between if between.ndim > 1 else None
+        return core.line_record(log.dt, source - start, log.velocity, self.log_every(log.dt), placed, *feed, known)
 
     def at_lines(self) -> Cascade:
         """See `Controller`."""
@@ -326,7 +329,7 @@ class Cascade(Controller):
 
     def torque_of(self, log: LoopSignals, also: Limiting | None = None, stored: float = 0.0) -> Vector:
         """See `Controller`."""
-        source, dt = self.command_of(log), log.dt
+        source, dt = self.source_of(log), log.dt
         assert source is not None
         ticks, limited = self.ticks(dt, source, log.position), self
         if also is not None:

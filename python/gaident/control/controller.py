@@ -140,6 +140,11 @@ class Controller(ABC):
         signal: Vector | None = getattr(log, self.driven_by)
         return signal
 
+    def source_of(self, log: LoopSignals) -> Vector | None:
+        """The same at the controller's samples (n, r) where the log knows it there, r samples to a line; else of `command_of`."""
+        between: Vector | None = getattr(log, "command_between", None) if self.driven_by == "command" else None
+        return self.command_of(log) if between is None else between
+
     def start_angle(self, source: Vector) -> float:
         """Angle [rad] at which its axis rests before a log without a position; source: of `command_of`, (n,)."""
         return float(source[0]) if self.driven_by == "position_command" else 0.0
@@ -186,7 +191,7 @@ class Controller(ABC):
 
     @abstractmethod
     def ticks(self, dt: float, command: Vector, position: Vector | None) -> Ticks:
-        """What it is given at its own clock, in a log with the sample time dt [s]; command: of `command_of`."""
+        """What it is given at its own clock, in a log with the sample time dt [s]; command: of `command_of`, or `source_of`."""
 
     @abstractmethod
     def core_loop(self, dt: float) -> _core.Loop:

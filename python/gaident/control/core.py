@@ -12,8 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gaident import _core
+from gaident.control.between import straight_part, with_means
 from gaident.control.controller import Controller, VelocityGains
-from gaident.control.ticks import Ticks, of_lines, straight_part
+from gaident.control.ticks import Ticks, of_lines
 from gaident.control.unknown import known
 
 __all__ = [
@@ -83,7 +84,8 @@ def effect_record(
 ) -> _core.EffectRecord:
     """A record and its loop, for models with effects and for every controller.
 
-    source: command [rad/s], in the open loop torque [N m], with a position controller position command [rad].
+    source: command [rad/s], in the open loop torque [N m], with a position controller position command [rad]; of
+    `Controller.source_of`.
     """
     ticks = of_lines(source, position) if controller is None else controller.ticks(dt, source, position)
     return _core.EffectRecord(
@@ -124,13 +126,23 @@ def record(dt: float, source: Vector, velocity: Vector, start: str, velocity0: f
 
 
 def line_record(
-    dt: float, command: Vector, velocity: Vector, every: int, placed: bool, velocity_feed: float, acceleration_feed: float
+    dt: float,
+    command: Vector,
+    velocity: Vector,
+    every: int,
+    placed: bool,
+    velocity_feed: float,
+    acceleration_feed: float,
+    known: Vector | None = None,
 ) -> _core.Record:
     """A record, from rest, of a loop whose controller takes `every` samples for each line of the log.
 
     command: of the velocity [rad/s] or, with a position controller (`placed`), of the position [rad] from its start.
+    known: a velocity command at the controller's samples (n, every); its mean over each line counts.
     """
     between, straight = straight_part(command, placed)
+    if known is not None:
+        command, between, straight = with_means(command, between, straight, known)
     return _core.Record(
         clock=_core.Clock(period=dt / every, log_every=every),
         input=command,

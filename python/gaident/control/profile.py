@@ -18,6 +18,7 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
+from gaident.control.between import at_the_clock, cubics
 from gaident.policy.table import POLICY
 
 __all__ = ["profile_between"]
@@ -32,7 +33,7 @@ BEFORE, AFTER = 2, 3  # no decision: lines that the parabolas of an interval tak
 def profile_between(line: Vector, every: int) -> Vector:
     """The positions at the controller's samples (n every,), of those at the lines (n,) [rad]."""
     if every == 1 or len(line) <= BEFORE + AFTER:
-        return _straight(line, every)
+        return at_the_clock(line, every)
     p = [x for x in np.lib.stride_tricks.sliding_window_view(_continued(line), BEFORE + 1 + AFTER).T]
     here, bent, bent_after = p[2], p[3] - 2.0 * p[2] + p[1], p[4] - 2.0 * p[3] + p[2]
     rise = p[3] - here
@@ -45,8 +46,7 @@ def profile_between(line: Vector, every: int) -> Vector:
     bent, bent_after = np.where(behind, bent_after, bent), np.where(ahead, bent, bent_after)
     bent, bent_after = (np.where(ahead & behind, 0.0, x) for x in (bent, bent_after))
     t = np.arange(every) / every
-    curved = np.outer(here, np.ones(every)) + np.outer(rise, t)
-    curved += 0.5 * t * (t - 1.0) * (np.outer(bent, 2.0 - t) + np.outer(bent_after, 1.0 + t)) / 3.0
+    curved = cubics(here, rise, bent, bent_after, every)
     turned = np.where(t[None, :] <= at[:, None], _at(before, t), _at(after, t))
     return np.where(corner[:, None], turned, curved).ravel()
 
@@ -59,12 +59,6 @@ def _continued(line: Vector) -> Vector:
         return [float(a + j * (a - b) + 0.5 * j * (j + 1) * (a - 2.0 * b + c)) for j in range(1, count + 1)]
 
     return np.concatenate([beyond(line[:3], BEFORE)[::-1], line, beyond(line[:-4:-1], AFTER)])  # no decision: a formula
-
-
-def _straight(line: Vector, every: int) -> Vector:
-    steps = np.diff(line)
-    steps = np.append(steps, steps[-1])
-    return (line[:, None] + steps[:, None] * (np.arange(every) / every)).ravel()
 
 
 def _corners(before: Parabola, after: Parabola, noise: float) -> tuple[NDArray[np.bool_], Vector]:

@@ -8,26 +8,26 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from gaident.control.between import at_the_clock, between_lines
 from gaident.control.profile import profile_between
 from gaident.errors import ControllerError
-from gaident.policy.table import POLICY
 
 __all__ = [
     "INTERPOLATIONS",
     "Feedforward",
     "Ticks",
-    "at_the_clock",
-    "between_lines",
     "multiple_of",
     "of_lines",
+    "push_of",
+    "pushed_between",
     "smooth_between",
-    "straight_part",
     "ticks_of",
 ]
 
 Vector = NDArray[np.float64]
 
-AROUND = 5  # no decision: a formula: an interval, two before and two after
+AROUND = 5  # no decision: a formula: lines that a third difference and a spline take
+PUSHES = 2  # no decision: of a solver: how many steps, a third one changes nothing
 WHOLE = 1e-6  # no decision: rounding of two decimal numbers that divide; more is no whole multiple
 
 
@@ -62,13 +62,14 @@ def ticks_of(
 ) -> Ticks:
     """dt: sample time of the log [s], which has a line for every `every`-th sample of the controller.
 
-    command: velocity command [rad/s], or with a position controller position command [rad], shape (n,).
+    command: velocity command [rad/s], or with a position controller position command [rad], shape (n,); or at the
+    controller's samples, where these are known, shape (n, every).
     placed: samples from one of the position controller's to the next; 0: there is none.
     between: of INTERPOLATIONS, how a position command goes from line to line.
     """
     period = dt / every
     if not placed:
-        source = between_lines(command, every)
+        source = between_lines(command, every) if command.ndim == 1 else command.ravel()
         velocity, step = source, 1
     else:
         source, step = INTERPOLATIONS[between](command, every), placed
@@ -83,74 +84,6 @@ def ticks_of(
         fed,
         np.zeros(0) if position is None else smooth_between(position, every),
     )
-
-
-def at_the_clock(line: Vector, every: int) -> Vector:
-    """A signal that goes straight from one line of the log to the next; after the last line it goes on."""
-    if every == 1:
-        return np.ascontiguousarray(line, dtype=np.float64)
-    steps = np.diff(line)
-    steps = np.append(steps, steps[-1])
-    return (line[:, None] + steps[:, None] * (np.arange(every) / every)).ravel()
-
-
-def between_lines(line: Vector, every: int) -> Vector:
-    """A velocity command between the lines of its log: on a ramp it goes straight, at a jump it is held until the next line.
-
-    An interval belongs to a ramp where the change over it is at most twice that over the interval before or after.
-    Where a ramp begins, ends or bends between two lines, the ramp before goes over into the one after where they meet:
-
-        x0 + b t = x1 - a (1 - t),   t = (x1 - x0 - a)/(b - a)
-
-    x0, x1 are the lines of the interval, b and a the changes over the intervals before and after, t from 0 to 1.
-    """
-    if every == 1:
-        return np.ascontiguousarray(line, dtype=np.float64)
-    steps = np.append(_ramps(line), 0.0)
-    t = np.arange(every) / every
-    made = line[:, None] + steps[:, None] * t
-    at, before, after = _bends(np.diff(line))
-    meeting = (line[at + 1] - line[at] - after) / (before - after)
-    rise, fall = line[at, None] + before[:, None] * t, line[at + 1, None] - after[:, None] * (1.0 - t)
-    made[at] = np.where(t < meeting[:, None], rise, fall)
-    return np.asarray(made).ravel()
-
-
-def _bends(steps: Vector) -> tuple[NDArray[np.intp], Vector, Vector]:
-    """Intervals within which one ramp goes over into another one, and the changes over the intervals before and after them.
-
-    Each of the ramps goes straight over two intervals, and the change over the interval is between theirs.
-    """
-    if len(steps) < AROUND:
-        return np.zeros(0, dtype=np.intp), np.zeros(0), np.zeros(0)
-    earlier, before, here, after, later = np.lib.stride_tricks.sliding_window_view(steps, AROUND).T
-    bend = np.abs(after - before)
-    straight = np.maximum(np.abs(before - earlier), np.abs(later - after)) <= POLICY.ramp_straight * bend
-    between = (np.minimum(before, after) < here) & (here < np.maximum(before, after))
-    (at,) = np.nonzero(straight & between)
-    return at + AROUND // 2, before[at], after[at]
-
-
-def _ramps(line: Vector) -> Vector:
-    """Change over each interval of a velocity command that belongs to a ramp, otherwise 0; shape (n - 1,)."""
-    steps = np.diff(line)
-    size = np.abs(steps)
-    near = np.maximum(np.append(0.0, size[:-1]), np.append(size[1:], 0.0))
-    return np.where(size <= POLICY.ramp * near, steps, 0.0)
-
-
-def straight_part(line: Vector, is_position: bool) -> tuple[str, Vector]:
-    """How a command goes from line to line, and the part of it that goes straight where it is mixed; shape (n,) or (0,).
-
-    "held": it changes at the lines only; "straight"; "mixed": the sum of two such commands.
-    A part that goes straight is 0 at the first line, so that nothing of it lies before the record.
-    """
-    steps = np.diff(line) if is_position else _ramps(line)
-    if not np.any(steps):
-        return "held", np.zeros(0)
-    if line[0] == 0.0 and np.array_equal(steps, np.diff(line)):
-        return "straight", np.zeros(0)
-    return "mixed", np.concatenate([[0.0], np.cumsum(steps)])
 
 
 def _slope(signal: Vector, step: int, period: float) -> Vector:
@@ -171,6 +104,39 @@ def smooth_between(line: Vector, every: int) -> Vector:
     spline = make_interp_spline(np.arange(n), line, k=3)
     at = np.minimum(np.arange(n * every) / every, n - 1.0)
     return np.asarray(spline(at), dtype=np.float64)
+
+
+def pushed_between(line: Vector, every: int, torque_of: Callable[[Vector], Vector], jumps: NDArray[np.intp]) -> Vector:
+    """A velocity at the controller's samples, whose slope jumps with the torque within some intervals of its log.
+
+    What the torque u pushes, see `push_of`, is not smooth there; what is left of the velocity w is:
+
+        w(t) = c U(t) + spline through (w - c U) at the lines
+    """
+    push = np.multiply(*push_of(line, every, torque_of, jumps))
+    return smooth_between(line - push[::every], every) + push
+
+
+def push_of(line: Vector, every: int, torque_of: Callable[[Vector], Vector], jumps: NDArray[np.intp]) -> tuple[float, Vector]:
+    """(c, U at the controller's samples): what the torque u pushes of a velocity w is c U [rad/s].
+
+        U: sum of u,   c = sum d3(w) d3(U)/sum d3(U)^2
+
+    d3: third differences of the lines around the jumps. c stands for the time between two samples over the motor's inertia.
+    torque_of: the controller's torque at its samples for a velocity there; jumps: numbers of the intervals.
+    """
+    c, pushed = 0.0, np.zeros(len(line) * every)
+    if every == 1 or len(jumps) == 0 or len(line) < AROUND:
+        return c, pushed
+    near = np.unique(np.clip(jumps[:, None] + np.arange(-3, 2), 0, len(line) - 4))  # no decision: a formula: of third differences
+    rough = np.diff(line, 3)[near]
+    for _ in range(PUSHES):
+        velocity = smooth_between(line - c * pushed[::every], every) + c * pushed
+        pushed = np.append(0.0, np.cumsum(torque_of(velocity))[:-1])
+        bent = np.diff(pushed[::every], 3)[near]
+        size = float(bent @ bent)
+        c = max(float(rough @ bent) / size, 0.0) if size > 0.0 else 0.0
+    return c, pushed
 
 
 def multiple_of(long: float, short: float, name: str, of: str) -> int:

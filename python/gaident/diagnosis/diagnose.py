@@ -29,6 +29,7 @@ from gaident.diagnosis.records.arguments import (
 from gaident.diagnosis.work import Work
 from gaident.errors import SettingsError
 from gaident.identification.identify import identify
+from gaident.identification.replay.command_timing import timed
 from gaident.identification.replay.driven_records import torque_driven
 from gaident.policy.table import POLICY
 from gaident.results.diagnosis import Diagnosis
@@ -137,8 +138,9 @@ def diagnose(
     with threadpool_limits(1, user_api="blas"), np.errstate(over="ignore", invalid="ignore"):
         given, lines = outliers_of_the_log(recorded, checked_controller(controller))
         asked = loop_of(given, checked_controller(controller))
+        given = timed(given, asked.controller)
         driven = torque_driven(given, asked.controller)
-    kept = outliers_of_the_log(apart, asked.controller)[0]
+        kept = timed(outliers_of_the_log(apart, asked.controller)[0], asked.controller)
     records, validating = driven.records, torque_driven(kept, asked.controller).records if kept else ()
     checked(records, validating, driven.loop, identification, bootstrap, seed, progress, axis, pitch)
     origin = {r.digest: whole for r, whole in zip((*records, *validating), (*given, *kept), strict=True)}

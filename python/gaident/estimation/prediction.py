@@ -85,7 +85,10 @@ class Predictor(Protocol):
 
 @dataclass(frozen=True)
 class OpenLoop:
-    """The torque drives the model; with an effect in the controller that no replay contains, the command does."""
+    """The torque drives the model; with an effect in the controller that no replay contains, the command does.
+
+    No replay contains what a controller did between the lines of a slower log.
+    """
 
     data: DataSet
     own_angle: bool = False
@@ -95,7 +98,7 @@ class OpenLoop:
     def velocities(self, parameters: Parameterisation, X: Matrix) -> Matrix:
         """See `Predictor`."""
         inside = [t for t in parameters.terms if t.in_controller]
-        if not all(t.replayable for t in inside):
+        if not all(t.replayable for t in inside) or (inside and self.data.slower):
             return ClosedLoop(self.data, self.own_angle).velocities(parameters, X)
         if inside:
             return self._replayed(parameters, X, inside)

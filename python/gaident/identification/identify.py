@@ -26,6 +26,7 @@ from gaident.identification.controller_numbers import with_estimates
 from gaident.identification.noise import Autoregression, autoregression_of, highest_order
 from gaident.identification.notes import record_notes, unseen_notes, warnings_of
 from gaident.identification.parts import search_parts
+from gaident.identification.replay.command_timing import timed
 from gaident.identification.replay.notes import replay_notes
 from gaident.identification.selection import Candidate
 from gaident.messages import Message
@@ -124,6 +125,7 @@ def identify(
     settings = Settings() if settings is None else settings
     if not isinstance(settings, Settings):
         raise SettingsError(f"settings is {settings!r}: give a gaident.Settings")
+    checked = list(timed(checked, numbers.controller))
     looped = looped_over(checked, simplest(numbers.controller, (r.dt for r in checked)), space, settings.initial_state != "free")
     given, loop = looped.records, looped.controller
     check_numbers(trials, seed, workers)

@@ -8,14 +8,16 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gaident.control import core
+from gaident.control.between import at_the_clock, between_lines, jumps_between
 from gaident.control.cascade import Cascade
 from gaident.control.pi import PI
-from gaident.control.ticks import at_the_clock, smooth_between
+from gaident.control.ticks import push_of, smooth_between
 from gaident.data.record import Record
 from gaident.models.made_torque import stored_beside
 from gaident.models.starts import starts_moving
@@ -30,7 +32,8 @@ Vector = NDArray[np.float64]
 class Log:
     """Lines of a record; velocity: at the controller's samples. stretch (n,): number of the line's stretch; -1: none.
 
-    moving: it starts in motion, and what the integrator stored before is not known.
+    moving: it starts in motion, and what the integrator stored before is not known. between: the command at the controller's
+    samples (n, r) where it is known there, see `Controller.source_of`; else `source`.
     """
 
     dt: float
@@ -39,7 +42,14 @@ class Log:
     position: Vector | None
     torque: Vector
     stretch: NDArray[np.intp]
+    between: Vector
     moving: bool = False
+
+    @property
+    def command(self) -> Vector:
+        """A velocity command at the controller's samples (n r,)."""
+        every = len(self.velocity) // len(self.source)
+        return between_lines(self.source, every) if self.between.ndim == 1 else self.between.ravel()
 
     def made(self, cascade: Cascade, straight: bool = False) -> Vector:
         """What the controller makes at the lines of the log [N m] (n,); straight: of a velocity straight between the lines.
@@ -48,19 +58,34 @@ class Log:
         """
         every = len(self.velocity) // len(self.source)
         velocity = at_the_clock(self.velocity[::every], every) if straight else self.velocity
-        ticks = cascade.ticks(self.dt, self.source, self.position)
+        ticks = cascade.ticks(self.dt, self.between, self.position)
         loop = cascade.core_loop(self.dt)
         torque = core.servo_torque(self.dt, ticks, velocity, loop)[::every]
         if self.moving or not (stored := stored_beside(self.torque, torque, cascade)):
             return torque
         return core.servo_torque(self.dt, ticks, velocity, loop, stored)[::every]
 
+    def pushed(self, cascade: Cascade) -> Log:
+        """The log with a velocity between the lines whose slope jumps where the command does, see `pushed_between`."""
+        if cascade.driven_by != "command":
+            return self
+        every = len(self.velocity) // len(self.source)
+        line, push = self.velocity[::every], np.multiply(*self.push(cascade))
+        return replace(self, velocity=smooth_between(line - push[::every], every) + push)
+
+    def push(self, cascade: Cascade) -> tuple[float, Vector]:
+        """What the torque pushes of the velocity where the command jumps, see `push_of`."""
+        every = len(self.velocity) // len(self.source)
+        ticks, loop = cascade.ticks(self.dt, self.between, None), cascade.core_loop(self.dt)
+        made = partial(core.servo_torque, self.dt, ticks, servo=loop)
+        return push_of(self.velocity[::every], every, made, jumps_between(self.source))
+
 
 def log_of(rec: Record, share: int, cascade: Cascade, whole: bool) -> Log:
     part = rec[:share]
     every = cascade.log_every(rec.dt)
-    source = cascade.command_of(part)
-    assert source is not None and part.torque is not None
+    source, between = cascade.command_of(part), cascade.source_of(part)
+    assert source is not None and between is not None and part.torque is not None
     size = np.abs(part.torque)
     limit = cascade.velocity.torque_limit or plateau_of(size)
     free = size < POLICY.at_limit * limit if not whole else np.ones(len(size), bool)
@@ -73,7 +98,7 @@ def log_of(rec: Record, share: int, cascade: Cascade, whole: bool) -> Log:
         stretch[: min(POLICY.filter_memory // 4, len(stretch) // 4)] = -1
     velocity = smooth_between(part.velocity, every)
     position = part.position if cascade.position is not None else None
-    return Log(rec.dt, source, velocity, position, part.torque, stretch, moving)
+    return Log(rec.dt, source, velocity, position, part.torque, stretch, between, moving)
 
 
 def plateau_of(size: Vector) -> float:

@@ -78,7 +78,7 @@ def tells_of_controller(rec: Record, controller: Controller) -> bool:
 def _off(rec: Record, controller: Controller) -> float:
     """Rms of logged minus made torque [N m], where that is more than the velocity between the lines can make; or 0."""
     cascade = cascade_of(controller)
-    log = log_of(rec, len(rec), cascade, whole=cascade.velocity.anti_windup == "none")
+    log = log_of(rec, len(rec), cascade, whole=cascade.velocity.anti_windup == "none").pushed(cascade)
     made = log.made(cascade)
     left = log.torque - made
     others = [one.made(cascade, straight) - made for one, straight in _others(log, rec)]

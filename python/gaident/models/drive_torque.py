@@ -8,10 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gaident.arguments import TORQUE
+from gaident.control.between import at_the_clock
 from gaident.control.controller import Controller
 from gaident.control.pi import PI
 from gaident.control.pi_torque import pi_block
-from gaident.control.ticks import at_the_clock
 from gaident.data.record import Record
 from gaident.data.signals.difference import is_backward_difference
 from gaident.errors import RecordError

@@ -28,10 +28,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gaident.control import core
+from gaident.control.between import jumps_between
 from gaident.control.controller import Controller
 from gaident.control.pi import bare_pi
 from gaident.control.pi_torque import pi_torque
-from gaident.control.ticks import smooth_between
+from gaident.control.ticks import pushed_between
 from gaident.data.record import Record
 from gaident.models.starts import constant_beside
 from gaident.policy.table import POLICY
@@ -87,16 +88,22 @@ def _from_rest(rec: Record, controller: Controller, driven: bool) -> Vector | No
 
 
 def made_at_its_clock(rec: Record, controller: Controller, stored: float = 0.0) -> Vector | None:
-    """The torque that a controller makes at all its samples [N m] (n every,), of command and velocity, smooth between lines.
+    """The torque that a controller makes at all its samples [N m] (n every,), of command and velocity, see `pushed_between`.
 
     stored: what its integrator holds before the record [N m]. None where the record lacks what it reads.
     """
-    source = controller.command_of(rec)
+    source = controller.source_of(rec)
     if source is None or any(getattr(rec, channel) is None for channel in controller.reads):
         return None
     ticks = controller.ticks(rec.dt, source, rec.position if controller.driven_by == "position_command" else None)
-    velocity = smooth_between(rec.velocity, controller.log_every(rec.dt))
-    return core.servo_torque(rec.dt, ticks, velocity, controller.core_loop(rec.dt), stored)
+    loop = controller.core_loop(rec.dt)
+
+    def made(velocity: Vector) -> Vector:
+        return core.servo_torque(rec.dt, ticks, velocity, loop, stored)
+
+    lines = source[:, 0] if source.ndim > 1 else source
+    jumps = jumps_between(lines) if controller.driven_by == "command" else np.zeros(0, dtype=np.intp)
+    return made(pushed_between(rec.velocity, controller.log_every(rec.dt), made, jumps))
 
 
 def late(torque: Vector, delay: float, before: float) -> Vector:

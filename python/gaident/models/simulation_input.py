@@ -93,4 +93,5 @@ def core_record(rec: Record, source: Signal, controller: Controller | None) -> _
     start = 0.0 if controller is None else controller.start_angle(source)
     if rec.position is not None:
         start = float(rec.position[0])
-    return core.effect_record(rec.dt, source, rec.position, rec.velocity, start, controller)
+    between = None if controller is None else controller.source_of(rec)
+    return core.effect_record(rec.dt, source if between is None else between, rec.position, rec.velocity, start, controller)

@@ -51,6 +51,12 @@ class Records:
     ramp_straight: float = record(
         0.1, "1", "of the bend between two ramps of a slow log's command, by which either may miss a straight line", SLOWER
     )
+    corner_unsure: float = record(
+        0.25,
+        "1",
+        "of how much a slow log's command bends otherwise: deviation of its mean between two lines; a corner makes 1/8",
+        SLOWER,
+    )
     no_ramp: float = record(0.35, "1", "of the band of a held speed, by which its halves differ at most; on a ramp 0.5", DRIVES)
     seen_turn: float = record(0.75, "1", "of a period, that a record turns at least to show what returns once in it", DRIVES)
     seen_periods: float = record(2.0, "periods", "in the travel, of what returns more often; less is any curve", DRIVES)

@@ -7,8 +7,8 @@ import pytest
 
 import gaident as ga
 from drive_rig import Plant, rig, run_drive, skip_without_library
+from gaident.control.between import at_the_clock, between_lines
 from gaident.control.profile import profile_between
-from gaident.control.ticks import at_the_clock, between_lines
 from gaident.errors import ControllerError
 from gaident.identification.closed_loop import line_equation
 from gaident.identification.controller_numbers import with_estimates

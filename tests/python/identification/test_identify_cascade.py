@@ -12,7 +12,7 @@ import gaident as ga
 import referee_logs
 import servo_referee as referee
 from gaident.control import core
-from gaident.control.ticks import at_the_clock, between_lines, straight_part
+from gaident.control.between import at_the_clock, between_lines, straight_part
 from gaident.errors import RecordError
 from gaident.identification.closed_loop import line_equation, with_torque
 from gaident.identification.logged_torque import not_followed

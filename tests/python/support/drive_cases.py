@@ -17,6 +17,7 @@ import gaident as ga
 from drive_rig import AT_LOAD, COUPLING, NOISES, Array, Noise, Plant, RanAwayError, between_lines, log_of, run_drive
 
 __all__ = [
+    "ANYWHERE",
     "EFFECTS",
     "KINDS",
     "NOISE_EFFECTS",
@@ -80,6 +81,8 @@ PAIRS = tuple(
 KINDS = ("multi", "step", "move")
 RAMPS = {"trapezoid": False, "s-shape": True}
 """Kinds of command that a ramp generator makes, for loops with a clock of their own -> whether the acceleration is rounded."""
+ANYWHERE = (*RAMPS, "jump")
+"""Kinds of command that change at any of the controller's samples, not at the lines of a log alone."""
 
 STEP_SAMPLES, LONG_SAMPLES = 250, 3500
 LONG_TIME = 1.75  # s, the least of a long record under a cascade, whose log may have many lines a second
@@ -157,13 +160,13 @@ def tuned(plant: Plant, rng: np.random.Generator, bandwidth: float | None = None
 
 
 def command_for(kind: str, plant: Plant, rng: np.random.Generator, other_order: bool = False) -> Array:
-    """A velocity command [rad/s]: one step, levels with reversals and dither, point-to-point moves, or one of RAMPS.
+    """A velocity command [rad/s]: one step, levels with reversals and dither, point-to-point moves, or one of ANYWHERE.
 
     Its sum, a position command [rad], for a drive with a position controller.
-    It is at the controller's clock; all but RAMPS are made at the lines of the log.
+    It is at the controller's clock; all but ANYWHERE are made at the lines of the log.
     """
-    if kind in RAMPS:
-        ticks = ramp_command(plant, rng, other_order, RAMPS[kind])
+    if kind in ANYWHERE:
+        ticks = ramp_command(plant, rng, other_order, kind)
         return np.cumsum(ticks) * (plant.dt / plant.log_every) if plant.placed else ticks
     command = {"step": step_command, "multi": level_command, "move": move_command}[kind](plant, rng, other_order)
     return between_lines(plant, np.cumsum(command) * plant.dt if plant.placed else command)
@@ -214,8 +217,10 @@ def level_command(plant: Plant, rng: np.random.Generator, other_order: bool) -> 
     return command
 
 
-def ramp_command(plant: Plant, rng: np.random.Generator, other_order: bool, rounded: bool) -> Array:
+def ramp_command(plant: Plant, rng: np.random.Generator, other_order: bool, kind: str) -> Array:
     """The levels, at the controller's clock; to each a ramp of its own slope that begins at any sample, and ends at any time.
+
+    "jump": no ramp, but a jump at that sample.
 
     x goes from 0 to 1 over the ramp; rounded: the acceleration rises over a share s of it, and falls over as much,
 
@@ -224,12 +229,14 @@ def ramp_command(plant: Plant, rng: np.random.Generator, other_order: bool, roun
     levels = levels_for(rng, other_order)
     samples, period = samples_of("multi", plant) * plant.log_every, plant.dt / plant.log_every
     length, command = samples / len(levels), np.full(samples, levels[0])
+    rounded = RAMPS.get(kind, False)
     share = float(rng.uniform(*ROUNDED)) if rounded else 0.0
     for i, (before, level) in enumerate(pairwise(levels), start=1):
         slope = float(np.exp(rng.uniform(*np.log(SLOPES))))
         lasts = min(abs(level - before) / (slope * (1 - share) * period), RAMPED * length)  # samples
         begins = round((i + rng.uniform(0, 1 - RAMPED)) * length)
-        x = np.clip((np.arange(samples) - begins) / lasts, 0.0, 1.0)
+        since = np.arange(samples) - begins
+        x = np.clip(since / lasts, 0.0, 1.0) if kind in RAMPS else (since >= 0.0).astype(np.float64)
         if rounded:
             rises, held, falls = (np.maximum(x - late, 0.0) ** 2 for late in (0.0, share, 1 - share))
             x = (rises - held - falls) / (2 * share * (1 - share))
@@ -402,7 +409,7 @@ def random_truth(
             name: draw_effect(name, factors[i] if factor is None else factor, now, samples, rng) for i, name in enumerate(effects)
         }
         commands = [command_for(kind, now, rng, other_order) for other_order in (False, True)]
-        if kind in RAMPS:
+        if kind in ANYWHERE:
             as_ramps_ask(hidden, now, commands[0])
         truth = Truth(
             effects=hidden, plant=now, kind=kind, noise=noise_now, factor=factor or (factors[0] if factors else 0.0), seed=seed,

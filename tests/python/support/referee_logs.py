@@ -8,7 +8,7 @@ import numpy as np
 
 import gaident as ga
 import servo_referee as referee
-from gaident.control.ticks import between_lines
+from gaident.control.between import between_lines
 
 __all__ = ["AXIS", "GIVEN", "KI", "KP", "NOTCH", "T", "command", "dip", "log", "low", "slower"]
 

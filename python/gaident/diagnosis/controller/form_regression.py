@@ -17,11 +17,11 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
+from gaident.control.between import at_the_clock
 from gaident.control.cascade import Cascade, Filter
 from gaident.control.filtering import filtered
 from gaident.control.filters import LowPass, Notch
 from gaident.control.pi import PI
-from gaident.control.ticks import at_the_clock, between_lines
 from gaident.data.record import Record
 from gaident.identification.logged_stretches import centred, correlation_of, log_of, numbered, whitened
 from gaident.identification.logged_torque import noise_between
@@ -192,7 +192,7 @@ def law_of(records: Sequence[Record], given: PI, every: int = 1, steps: tuple[fl
         cascade = Cascade(given, period)
         logs = [log_of(r, share, cascade, False) for r in records]
         stretch = numbered([log.stretch for log in logs])
-        command = np.concatenate([between_lines(log.source, every) for log in logs])
+        command = np.concatenate([log.command for log in logs])
         smooth = np.concatenate([log.velocity for log in logs])
         straight = np.concatenate([at_the_clock(log.velocity[::every], every) for log in logs])
         used = stretch >= 0

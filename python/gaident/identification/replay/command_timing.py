@@ -1,0 +1,250 @@
+"""When, between the lines of a slow log, the velocity command changed: as the logged torque tells it.
+
+Of a jump that falls between two lines, or a ramp that is over within them, the lines do not tell the time (`control.between`):
+an unknown share s of the change comes early, in each such interval one.
+The controller integrates its error.
+So the torque at the lines tells the mean of the command over each interval, and more where filters remember it.
+d is the logged torque minus what the controller makes of the measured velocity, D its differences:
+
+    D(n) = sum over intervals i of  c_i(n) (s_i - s_i0) + v(n)
+
+c_i: the controller's answer to a pulse of the command in that interval.
+v: an autoregression (what the velocity did between the lines is lost); both sides are whitened by it.
+No plant is involved, and stretches in which a limit acts are left out.
+Of a jump at which a limit acts the velocity tells the time: it turns where the torque jumps (`_Timing.seen`).
+With normal priors of the shares this is a linear least squares problem, solved again where a jump has moved (Gauss-Newton).
+
+That every jump falls on a line is the simpler explanation, and stands unless the other has the higher evidence
+(Laplace approximation; MacKay 1992): with the normal matrix N of the whitened equations and the priors' deviations S,
+
+    2 ln(evidence) gained = |e_lines|^2 - |e|^2 - |S^-1 (s - s_prior)|^2 - ln det(1 + S N S)
+
+D. J. C. MacKay, Bayesian interpolation, Neural Computation 4, 1992.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gaident.control import core
+from gaident.control.between import Unsure, unsure_between
+from gaident.control.cascade import Cascade, cascade_of
+from gaident.control.controller import Controller
+from gaident.control.filtering import filtered
+from gaident.data.record import Record
+from gaident.data.torque_kind import COMMANDED
+from gaident.identification.logged_stretches import Log, log_of, unlimited
+from gaident.identification.logged_torque import not_followed
+from gaident.identification.noise import Autoregression, autocorrelation, autoregression_of, highest_order
+from gaident.identification.replay.timed_record import TimedRecord
+from gaident.models.starts import noise_std
+from gaident.policy.table import POLICY
+
+if TYPE_CHECKING:
+    from scipy.sparse import csc_array
+
+__all__ = ["timed"]
+
+Vector = NDArray[np.float64]
+
+BESIDE = 2  # no decision: lines beside a limit: between them it may have acted too
+MEDIAN = 1.4826  # no decision: a formula: deviation of normal numbers over the median of their sizes
+WINDOW = np.arange(-3, 5)  # no decision: a formula: the lines around an interval, and it needs all of them inside of the record
+SMOOTH = 3  # no decision: numbers of a parabola, which is smooth over so few lines
+SHARE_STEP = 0.1  # no decision: the step of a difference
+ROUNDS = 4  # no decision: of a solver: how many steps, the third one has converged
+
+
+def timed(records: Sequence[Record], controller: Controller | None) -> tuple[Record, ...]:
+    """The records, those that know when their command changed between their lines as `TimedRecord`.
+
+    They know it where the log is slower than its controller, that is driven by a velocity command and known, and a commanded
+    torque is logged, which then follows from this controller: one that is not the drive's, or another limit, is no time.
+    A record that is timed already is timed anew.
+    """
+    if controller is None or controller.unknown or controller.driven_by != "command":
+        return tuple(records)
+    return tuple(_timed(rec.plain if isinstance(rec, TimedRecord) else rec, controller) for rec in records)
+
+
+def _timed(rec: Record, controller: Controller) -> Record:
+    every = controller.log_every(rec.dt)
+    if every == 1 or rec.command is None or rec.torque is None or rec.torque_is != COMMANDED or len(rec) < POLICY.least_samples:
+        return rec
+    unsure = unsure_between(rec.command, every)
+    timing = _Timing.of(rec, cascade_of(controller), unsure)
+    if not len(unsure.at) or np.sum(timing.used) < POLICY.least_samples:
+        return rec
+    between = timing.solved()
+    if between is None:
+        return rec
+    found = TimedRecord.of(rec, between)
+    return rec if not_followed([found], controller) else found
+
+
+class _Seen(NamedTuple):
+    """weight, right (m,): what is added to the normal equations of the shares, on the diagonal and to the right.
+
+    gained: how much less is left than with jumps on the lines, in variances of the noise.
+    """
+
+    weight: Vector
+    right: Vector
+    gained: float
+
+
+@dataclass(frozen=True, eq=False)
+class _Timing:
+    """log: with its command at the lines; pulse (k,): the controller's torque at its samples [N m] after 1 rad/s in one of them.
+
+    used (n - 1,): differences of lines between limits, not beside one.
+    """
+
+    log: Log
+    cascade: Cascade
+    unsure: Unsure
+    pulse: Vector
+    used: NDArray[np.bool_]
+
+    @classmethod
+    def of(cls, rec: Record, cascade: Cascade, unsure: Unsure) -> _Timing:
+        log = log_of(rec, len(rec), cascade, whole=False)
+        every, stretch = unsure.every, log.stretch
+        used = (stretch[1:] >= 0) & (stretch[1:] == stretch[:-1])
+        used = np.convolve(used, np.ones(2 * BESIDE + 1), "same") > 2 * BESIDE
+        free = replace(cascade, velocity=unlimited(cascade.velocity))
+        count = min(POLICY.filter_memory, len(rec))
+        still = np.zeros((count, every))
+        asked = still.copy()
+        asked[0, 0] = 1.0
+        pulse = core.servo_torque(rec.dt, free.ticks(rec.dt, asked, None), still.ravel(), free.core_loop(rec.dt))
+        return cls(log, cascade, unsure, pulse, used)
+
+    def off(self, between: Vector) -> Vector:
+        """D (n - 1,) [N m] of a command at the samples (n, r) or at the lines (n,)."""
+        made = replace(self.log, between=between).pushed(self.cascade).made(self.cascade)
+        return np.where(self.used, np.diff(self.log.torque - made), 0.0)
+
+    def solved(self) -> Vector | None:
+        """The command at the samples (n, r); None where its lines explain the torque as well."""
+        from scipy.sparse import diags_array
+
+        unsure = self.unsure
+        usual, spread = unsure.usual, unsure.spread
+        share = usual.copy()
+        for _ in range(ROUNDS):
+            off = self.off(unsure.early(share))
+            noise = self.noise_of(off)
+            white = self.whitened(off[None, :], noise)[0]
+            columns = self.columns(share, noise)
+            normal = (columns.T @ columns).tocsc()
+            seen = self.seen(share, normal.diagonal() * spread**2 < 1.0)  # no decision: where the prior tells more
+            normal = (normal + diags_array(seen.weight)).tocsc()
+            share = np.clip(share + self.step(normal, columns.T @ white + seen.right, usual - share), 0.0, 1.0)
+        left, lines = (
+            float(np.sum(self.whitened(self.off(command)[None, :], noise) ** 2))
+            for command in (unsure.early(share), self.log.source)
+        )
+        prior = float(np.sum(((share - usual) / spread) ** 2))
+        gained = lines - left + seen.gained - prior - self.log_det(normal)
+        return unsure.early(share) if gained > POLICY.rival_margin else None
+
+    def seen(self, share: Vector, blind: NDArray[np.bool_]) -> _Seen:
+        """What the velocity tells of the jumps (m,) of which the torque tells nothing, as where a limit acts on either side.
+
+        The torque pushes the velocity from the jump on, see `push_of`: what is left of it at the lines around is smooth.
+        By how much the velocity is late, as one that is differenced or behind an actuator's lag, the other jumps tell.
+        """
+        every, line = self.unsure.every, self.log.velocity[:: self.unsure.every]
+        inside = (self.unsure.at >= -WINDOW[0]) & (self.unsure.at + WINDOW[-1] < len(line))
+        (jump,) = np.nonzero(self.unsure.jump & inside)
+        weight, right = np.zeros((2, len(share)))
+        if not np.any(blind[jump]):
+            return _Seen(weight, right, 0.0)
+        moved = share.copy()
+        step = np.where(share[jump] < self.unsure.usual[jump], SHARE_STEP, -SHARE_STEP)
+        moved[jump] += step
+        (c, here), (_, other), (_, lines) = (
+            replace(self.log, between=command).push(self.cascade)
+            for command in (self.unsure.early(share), self.unsure.early(moved), self.log.source)
+        )
+        around = self.unsure.at[jump, None] + WINDOW
+        parabola = np.broadcast_to(np.vander(WINDOW.astype(np.float64), SMOOTH), (len(jump), len(WINDOW), SMOOTH))
+
+        def beside(push: Vector, x: Vector) -> Vector:
+            """x around the jumps, without a parabola and what such a push takes off it."""
+            basis = np.linalg.qr(np.concatenate([parabola, push[around][:, :, None]], axis=2))[0]
+            rows: Vector = x[around] - (basis @ (basis.transpose(0, 2, 1) @ x[around][:, :, None]))[:, :, 0]
+            return rows
+
+        here, other, lines = (x[::every] for x in (here, other, lines))
+        left, change, on_lines = beside(here, line), c * beside(here, other - here) / step[:, None], beside(lines, line)
+        std = max(noise_std(line - c * here), float(np.finfo(np.float64).eps) * float(np.abs(line).max()))
+        told, sure, pull = ~blind[jump], np.sum(change**2, axis=1), np.sum(change * left, axis=1)
+        late = float(np.sum(pull[told]) / np.sum(sure[told])) if np.any(sure[told] > 0.0) else 0.0
+        left, on_lines = ((x - late * change)[~told] for x in (left, on_lines))
+        weight[jump] = np.where(told, 0.0, sure / std**2)
+        right[jump] = np.where(told, 0.0, (pull - late * sure) / std**2)
+        return _Seen(weight, right, float(np.sum(on_lines**2) - np.sum(left**2)) / std**2)
+
+    def step(self, normal: csc_array, right: Vector, from_usual: Vector) -> Vector:
+        """Of the shares, from the normal equations with their priors."""
+        from scipy.sparse import diags_array
+        from scipy.sparse.linalg import spsolve
+
+        weight = self.unsure.spread**-2.0
+        found: Vector = spsolve(normal + diags_array(weight, format="csc"), right + weight * from_usual)
+        return np.atleast_1d(found)
+
+    def log_det(self, normal: csc_array) -> float:
+        """ln det(1 + S N S)."""
+        from scipy.sparse import diags_array, eye_array
+        from scipy.sparse.linalg import splu
+
+        scaled = diags_array(self.unsure.spread)
+        lower = splu((eye_array(normal.shape[0]) + scaled @ normal @ scaled).tocsc())
+        return float(np.sum(np.log(np.abs(lower.U.diagonal()))))
+
+    def noise_of(self, off: Vector) -> Autoregression:
+        """Of D where it is used, without what the shares are still off by: as the quiet lines show its size."""
+        used = off[self.used]
+        rounding = np.finfo(np.float64).eps * float(np.abs(self.log.torque).max())
+        quiet = max(MEDIAN * float(np.median(np.abs(used))), rounding)
+        most = POLICY.above_noise * quiet
+        noise = autoregression_of(autocorrelation(np.clip(off, -most, most), highest_order([len(used)])), len(used))
+        return Autoregression(noise.phi, max(noise.std, rounding))
+
+    def whitened(self, rows: Vector, noise: Autoregression) -> Vector:
+        """Rows of D (k, n - 1) over their noise; 0 where a limit lies within the filter."""
+        rows = filtered(np.append(1.0, -noise.phi), np.ones(1), rows, [rows.shape[1]]) / noise.std
+        return np.where(self.reached(noise.order), rows, 0.0)
+
+    def reached(self, order: int) -> NDArray[np.bool_]:
+        """Differences before which `order` others are used (n - 1,)."""
+        counts = np.cumsum(np.append(0, self.used))
+        first = np.maximum(np.arange(len(self.used)) - order, 0)
+        return np.asarray(counts[1:] - counts[first] == np.minimum(np.arange(len(self.used)), order) + 1)
+
+    def columns(self, share: Vector, noise: Autoregression) -> csc_array:
+        """What D whitened changes with each share (n - 1, m)."""
+        from scipy.sparse import csc_array
+
+        every, unsure = self.unsure.every, self.unsure
+        middle, n = unsure.middle(share), len(self.used)
+        lines = len(self.pulse) // every
+        # The torque at the lines behind a pulse at sample p of an interval, from its own line on.
+        answers = np.array([np.append(0.0, self.pulse[every - p :: every])[:lines] for p in range(every)])
+        shapes = filtered(np.append(1.0, -noise.phi), np.ones(1), np.diff(answers, axis=1), [lines - 1])
+        size = np.abs(shapes).max(axis=0)
+        lasts = int(np.flatnonzero(size > POLICY.negligible * size.max(initial=0.0)).max(initial=0)) + 1
+        rows = unsure.at[:, None] + np.arange(lasts)
+        values = shapes[middle, :lasts] * (unsure.rise * (every - 1) / noise.std)[:, None]
+        inside = rows < n
+        inside &= np.append(self.reached(noise.order), False)[np.minimum(rows, n)]
+        of = np.broadcast_to(np.arange(len(unsure.at))[:, None], rows.shape)
+        return csc_array((values[inside], (rows[inside], of[inside])), shape=(n, len(unsure.at)))

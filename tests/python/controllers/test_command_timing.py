@@ -1,0 +1,147 @@
+"""When a velocity command changed between the lines of a slow log: as the torque tells it."""
+
+from __future__ import annotations
+
+import pickle
+from typing import Any
+
+import numpy as np
+import pytest
+
+import gaident as ga
+from drive_rig import Plant, run_drive, skip_without_library
+from gaident.control.between import between_lines, unsure_between
+from gaident.identification.replay.command_timing import timed
+from gaident.identification.replay.timed_record import TimedRecord
+
+T = 125e-6
+LOOP = ga.Cascade(ga.PI(0.1, 6.0), T)
+FILTERED = ga.Cascade(ga.PI(0.1, 6.0, rule="backward"), T, torque_filters=(ga.LowPass(0.3e-3),))
+
+skip_without_library()
+
+
+def levels(every: int, seed: int, on_lines: bool = False) -> np.ndarray:
+    """Levels [rad/s] that begin at any of a controller's samples, at least 60 lines each; (1000 every,)."""
+    rng, whole, at = np.random.default_rng(seed), np.zeros(1000 * every), 100
+    while at < 1000:
+        whole[at * every + (0 if on_lines else int(rng.integers(every))) :] = rng.uniform(-40.0, 40.0)
+        at += int(rng.integers(60, 150))
+    return whole
+
+
+def record(whole: np.ndarray, every: int, loop: ga.Cascade = LOOP, **more: Any) -> ga.Record:
+    """The log of two masses under this command at the controller's samples [rad/s], every so-many-th of them."""
+    axis = Plant(J=4e-4, D=1e-3, JL=4e-4, DL=1e-3, KG=60.0, DG=5e-3, kp=0.1, ki=6.0, dt=every * T, cascade=loop)
+    log = run_drive(axis, whole, more, encoder=2 * np.pi / 2**20, differenced=True)
+    lines = {"velocity": log.velocity, "torque": log.torque, "command": whole}
+    return ga.Record(every * T, **{name: x[::every] for name, x in lines.items()})
+
+
+def means_off(command: np.ndarray, whole: np.ndarray, every: int) -> float:
+    """The greatest error of a command's mean over a line [rad/s]."""
+    return float(np.abs((command.ravel() - whole).reshape(-1, every).mean(axis=1))[:-1].max())
+
+
+@pytest.mark.parametrize("every", [2, 4, 8])
+@pytest.mark.parametrize("loop", [LOOP, FILTERED], ids=["bare", "filtered"])
+def test_the_torque_tells_when_the_command_jumped(every: int, loop: ga.Cascade) -> None:
+    whole = levels(every, every)
+    rec = record(whole, every, loop)
+    (found,) = timed([rec], loop)
+    assert isinstance(found, TimedRecord) and found == rec and found.digest == rec.digest
+    assert found.command_between is not None
+    assert np.array_equal(found.command_between[:, 0], rec.command)
+    assert means_off(between_lines(whole[::every], every), whole, every) > 10.0, "jumps held until the next line"
+    assert means_off(found.command_between, whole, every) < 0.5
+
+
+def test_short_ramps_are_told_from_jumps() -> None:
+    """A ramp that begins and ends within two lines."""
+    every = 8
+    whole = np.convolve(levels(every, 3), np.ones(7) / 7)[: 1000 * every]
+    rec = record(whole, every)
+    (found,) = timed([rec], LOOP)
+    assert isinstance(found, TimedRecord) and found.command_between is not None
+    assert means_off(between_lines(whole[::every], every), whole, every) > 10.0
+    assert means_off(found.command_between, whole, every) < 0.7
+
+
+@pytest.mark.parametrize("every", [2, 8])
+def test_jumps_on_the_lines_stay_there(every: int) -> None:
+    rec = record(levels(every, 5, on_lines=True), every)
+    assert timed([rec], LOOP)[0] is rec
+
+
+def test_what_tells_nothing_changes_nothing() -> None:
+    whole = levels(8, 6)
+    rec = record(whole, 8)
+    assert timed([rec], None) == (rec,)
+    unknown = ga.Cascade(ga.PI(None, None), T)
+    for one, loop in (
+        (rec.with_channels(torque=None), LOOP),
+        (rec.with_channels(torque_is="measured"), LOOP),
+        (rec, unknown),
+        (rec, ga.PI(0.1, 6.0)),
+        (record(whole, 1), LOOP),
+    ):
+        assert timed([one], loop)[0] is one
+
+
+def test_a_limit_that_acts_between_the_lines_tells_no_time() -> None:
+    """Where the anti-windup holds, the integral at the lines is not what the lines make."""
+    limited = ga.Cascade(ga.PI(0.1, 6.0, torque_limit=1.5, anti_windup="hold"), T)
+    rec = record(levels(2, 7, on_lines=True), 2, limited)
+    assert rec.torque is not None and np.mean(np.abs(rec.torque) >= 1.5) > 0.02
+    assert timed([rec], limited)[0] is rec
+
+
+def test_a_timed_record_is_cut_and_changed_like_any_other() -> None:
+    whole = levels(4, 8)
+    rec = record(whole, 4)
+    (found,) = timed([rec], LOOP)
+    assert isinstance(found, TimedRecord) and found.command_between is not None
+    part = found[100:400]
+    assert isinstance(part, TimedRecord) and part == rec[100:400]
+    assert np.array_equal(part.command_between, found.command_between[100:400])
+    other = found.with_channels(torque=2.0 * np.asarray(rec.torque))
+    assert isinstance(other, TimedRecord) and other.command_between is found.command_between
+    for plain in (found.with_channels(command=rec.velocity), found.with_channels(dt=1e-3), found.plain):
+        assert type(plain) is ga.Record
+    again = pickle.loads(pickle.dumps(found))
+    assert isinstance(again, TimedRecord) and again == found
+    assert np.array_equal(again.command_between, found.command_between)
+    assert isinstance(timed([found], LOOP)[0], TimedRecord), "timed anew"
+
+
+@pytest.mark.parametrize("every", [2, 3, 8])
+def test_shares_are_means_between_the_lines(every: int) -> None:
+    line = np.array([0.0, 0.0, 0.0, 5.0, 5.0, 6.0, 9.0, 13.0, 16.0, 16.5, 16.5, 4.0, 4.0, 4.0])
+    unsure = unsure_between(line, every)
+    assert {2, 10} <= set(unsure.at[unsure.jump])
+    for share in (0.0, 0.3, 1.0):
+        made = unsure.early(np.full(len(unsure.at), share))
+        assert np.array_equal(made[:, 0], line)
+        assert np.allclose(made[unsure.at, 1:].mean(axis=1), line[unsure.at] + share * unsure.rise)
+    assert np.all((unsure.usual >= 0.0) & (unsure.usual <= 1.0))
+
+
+def test_jumps_between_the_lines_are_no_cause() -> None:
+    """They were named as friction, a resonance, a delay; J was 2 to 30 % off."""
+    for every, seed in ((4, 2), (8, 3)):
+        dia = ga.diagnose(record(levels(every, seed), every), LOOP)
+        assert (dia.verdict, [f.effect for f in dia.causes]) == ("adequate", []), every
+        assert dia.mechanics["motor_inertia"].value == pytest.approx(4e-4, rel=5e-3)
+        assert dia.mechanics["load_inertia"].value == pytest.approx(4e-4, rel=5e-3)
+
+
+def test_friction_is_named_under_jumps_between_the_lines() -> None:
+    rec = record(levels(8, 4), 8, coulomb_friction={"torque": 0.05})
+    dia = ga.diagnose(rec, LOOP)
+    assert [f.effect for f in dia.causes] == ["coulomb_friction"]
+    assert dia.causes[0].parameters["torque"].value == pytest.approx(0.05, rel=0.05)
+
+
+def test_an_identification_takes_the_means_between_the_lines() -> None:
+    idn = ga.identify(record(levels(8, 9), 8), LOOP, seed=1)
+    assert pytest.approx(8e-4, rel=5e-3) == idn.mechanics.J
