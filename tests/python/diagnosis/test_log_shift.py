@@ -117,6 +117,19 @@ def test_a_measured_torque_is_moved_only_where_law_and_motion_agree() -> None:
     assert moves == {} and "The motion does not tell which" in found.notes[0]
 
 
+@pytest.mark.parametrize("late", [-2, -1, 1, 2])
+def test_a_measured_torque_at_its_limit_is_moved_as_well(late: int) -> None:
+    """Its noise lifts the highest lines above the limit: what stands at the limit is judged by the limit."""
+    limited = ga.PI(0.03, 1.9, torque_limit=0.8)
+    quiet = ga.Record(1e-3, command=np.append(np.zeros(20), STEPS), velocity=np.zeros(20 + len(STEPS)))
+    done = ga.run(ga.OneMass(J=3e-4, D=2e-3), quiet, limited)
+    rec = quiet.with_channels(velocity=done.velocity, torque=done.torque)
+    assert rec.torque is not None and np.mean(np.abs(rec.torque) >= 0.8) > 0.02
+    for share in (0.01, 0.05):
+        found = aligned([noisy(rec.shifted(torque=late), share)], [], limited)
+        assert list(found.shifts.values()) == [{"torque": -late}]
+
+
 def leads(plant: Plant, frequency: NDArray[np.float64]) -> NDArray[np.float64]:
     """Samples by which the velocity of the motor leads that of one rigid mass with the plant's whole inertia and damping.
 
@@ -221,6 +234,16 @@ def test_a_lag_that_the_model_accounts_for_is_no_reason_to_shift_the_log() -> No
         assert found.notes[0] in found.noted(replace(dia, model=model)).notes
     half = replace(dia, model=dia.model.mechanism.with_effect("torque_lag", time_constant=5e-4), velocity_age=0.5)
     assert "the torque lag and the age of the velocity, 1 sample together" in found.noted(half).notes[0]
+
+
+def test_a_delay_of_whole_samples_in_open_loop_may_be_the_log_s() -> None:
+    """A delay, a filter of the sensor or a log that wrote the torque early: without a controller nothing tells them apart."""
+    rec = rig(RIGID, STEPS, {"transport_delay": {"delay": 1e-3}}).with_channels(command=None)
+    (cause,) = ga.diagnose(rec).causes
+    assert cause.effect == "transport_delay" and "log_shift" in cause.alternatives
+    assert "log_shift" not in ga.diagnose(rig(RIGID, STEPS, DELAY), RIGID.controller).causes[0].alternatives
+    part = rig(RIGID, STEPS, {"transport_delay": {"delay": 1.5e-3}}).with_channels(command=None)
+    assert all("log_shift" not in f.alternatives for f in ga.diagnose(part).causes), "no log is half a line early"
 
 
 def test_how_late_a_slow_signal_comes_out_is_the_slope_of_the_phase() -> None:

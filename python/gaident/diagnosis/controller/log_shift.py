@@ -39,6 +39,7 @@ from gaident.estimation.regression.torque_lag import TorqueLag, torque_lag
 from gaident.identification.notes import reading_notes
 from gaident.identification.replay.replay import replay
 from gaident.models.effects_linear import LINEAR
+from gaident.models.starts import noise_std
 from gaident.policy.table import POLICY
 from gaident.results.diagnosis import Diagnosis
 
@@ -65,6 +66,11 @@ class Aligned:
     shifts: Mapping[str, Mapping[str, int]] = field(default_factory=dict)
     given: Mapping[str, Record] = field(default_factory=dict)
     behind: Mapping[Text, tuple[str, TorqueLag, float]] = field(default_factory=dict)
+
+    @property
+    def may_be_early(self) -> bool:
+        """Whether a motion is behind its torque by whole samples, as where the log wrote the torque early."""
+        return any(_whole(lag) and round(lag.lag) != 0 for _, lag, _ in self.behind.values())
 
     def noted(self, result: Diagnosis) -> Diagnosis:
         """The result, in terms of the records that were given; a motion behind its torque is explained where the model does."""
@@ -136,7 +142,10 @@ def _shift_of_law(rec: Record, controller: PI) -> tuple[int, int]:
     r, w, u = (x[: POLICY.most_samples] for x in (rec.command, rec.velocity, rec.torque))
     farthest = POLICY.log_late
     inner = slice(farthest, len(u) - farthest)
-    within = np.abs(u[inner]) < POLICY.at_limit * float(np.abs(u).max())
+    # Noise of a measured torque lifts the highest line above the limit, and lowers others at it.
+    highest = min(float(np.abs(u).max()), controller.limits[0])
+    noise = POLICY.above_noise * noise_std(u) if rec.torque_is == MEASURED else 0.0
+    within = np.abs(u[inner]) < POLICY.at_limit * highest - noise
     n, top = int(within.sum()), float(np.std(u))
     if n < POLICY.least_rows or not top > 0.0:
         return 0, 0
@@ -179,7 +188,8 @@ def _moves(rec: Record, a: int, b: int) -> dict[str, int]:
 
 
 def _samples(k: float) -> str:
-    return f"{abs(k):.3g} sample{'' if abs(k) == 1 else 's'}"
+    size = f"{abs(k):.3g}"
+    return f"{size} sample{'' if size == '1' else 's'}"
 
 
 def _moved_note(moves: Mapping[str, int], b: int, lag: TorqueLag | None) -> Text:
@@ -224,9 +234,7 @@ def _of_motion(lag: TorqueLag, refuted: bool) -> tuple[Mapping[str, int], Text]:
     if not _said(lag):
         return {}, Text("")
     whole = round(lag.lag)
-    apart = abs(lag.lag - whole)
-    told = apart + POLICY.contradiction * lag.std < 0.5  # no decision: rounding: the nearest whole number
-    if lag.lag > 0.0 and apart < POLICY.lag_whole and told:
+    if lag.lag > 0.0 and _whole(lag):
         text = (
             "The motion comes {} before the logged {torque} that makes it, which no axis does: the log wrote the {torque} {} "
             "late (or the velocity early). The {torque} was moved by {:+d}, and everything below is of that."
@@ -245,6 +253,13 @@ def _of_motion(lag: TorqueLag, refuted: bool) -> tuple[Mapping[str, int], Text]:
         )
         return {}, say(text, _samples(lag.lag), REFUTED if refuted else "without a controller", remedy)
     return {}, say(text, _samples(lag.lag), remedy)
+
+
+def _whole(lag: TorqueLag) -> bool:
+    """Whether a lag is a whole number of samples, and no other one within its deviation."""
+    apart = abs(lag.lag - round(lag.lag))
+    told = apart + POLICY.contradiction * lag.std < 0.5  # no decision: rounding: the nearest whole number
+    return apart < POLICY.lag_whole and told
 
 
 def _said(lag: TorqueLag) -> bool:

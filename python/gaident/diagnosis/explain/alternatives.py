@@ -14,10 +14,12 @@ from gaident.diagnosis.selection.rivals import Replacement
 from gaident.models.effect_rows import SHAFT
 from gaident.results.estimate import Estimate
 
-__all__ = ["alike_here", "alternatives_of", "impossible_here"]
+__all__ = ["LOG_SHIFT", "alike_here", "alternatives_of", "impossible_here"]
 
 OF_THE_CONTROLLER = (OTHER_GAINS, "torque_filter")
 """What a controller that is not the drive's may lack, in words of the findings."""
+LOG_SHIFT = "log_shift"
+"""A log that wrote the torque whole lines early, in place of what makes a motion late."""
 
 
 def alike_here(effect: str, excited: Excitation, torque_logged: bool) -> set[str]:
