@@ -120,3 +120,21 @@ def test_a_limit_that_hides_under_ramps_is_reached(blind: Any) -> None:
     for cell in cells[:4]:
         record, *_, truth = blind.case_of(cell)
         assert np.mean(np.abs(record.torque) >= truth.effects["torque_saturation"]["limit"]) > 2e-3
+
+
+def test_a_filter_of_the_velocity_is_found_under_jumps_between_the_lines_where_a_bare_pi_is_given(blind: Any) -> None:
+    """Beside it a second mass of no effect was a candidate in the place of a gap, which ended with an IndexError."""
+    cells = [c for c in blind.cells("jumps", 1, 2051) if (c.loop, c.every, c.effects) == ("velocity filter", 4, ())]
+    record, validation, controller, _ = blind.case_of(cells[0])
+    pi = controller.velocity
+    dia = ga.diagnose(record, controller=ga.Cascade(ga.PI(pi.kp, pi.ki), controller.period), validation=validation)
+    assert [f.effect for f in dia.findings if f.place == "controller"] == ["velocity_feedback_filter"]
+
+
+@pytest.mark.parametrize("loop", ["notch", "position", "hold"])
+def test_jumps_fall_between_the_lines(blind: Any, loop: str) -> None:
+    (cell,) = (c for c in blind.cells("jumps", 1, 1) if c.loop == loop and c.every == 8 and not c.effects)
+    *_, truth = blind.case_of(cell)
+    speed = np.diff(truth.command, prepend=0.0) / 125e-6 if truth.plant.placed else truth.command
+    begins = np.flatnonzero(np.abs(np.diff(speed)) > 1e-6) + 1
+    assert len(begins) > 15 and np.mean(begins % 8 != 0) > 0.6

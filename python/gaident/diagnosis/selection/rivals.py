@@ -35,10 +35,11 @@ def rivals_of(space: Moves, final: Fit, effect: str, equivalent: Collection[str]
     found = []
     turned = space.at_other_side(final, term)
     elsewhere = "" if turned is None else turned.parameters.terms[-1].name
-    others, missed = space.add(less), term.impacts and _missed(space, final, less)
-    if missed:
-        others = [*(f for f in others if not f.parameters.terms[-1].impacts), *space.instead(final, term)]
-    others = [f for f in others if _only_new(f, final) not in ("", elsewhere)]
+    others = [f for f in space.add(less) if _only_new(f, final) not in ("", elsewhere)]
+    missed = term.impacts and _missed(space, final, less)
+    if missed:  # a candidate may be the model with another mechanism and no effect
+        others = [f for f in others if not f.parameters.term(_only_new(f, final)).impacts]
+        others += [f for f in space.instead(final, term) if _only_new(f, final) not in ("", elsewhere)]
     if final.impacts and not space.quiet(final):
         reach = space.policy.rival_reach * gain
         others = [space.in_its_place(final, term, f, reach) for f in others]
