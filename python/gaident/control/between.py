@@ -137,6 +137,14 @@ class Unsure:
         made[self.at] = np.where(self.jump[:, None], jumps, bends)
         return made
 
+    def with_jumps_on_lines(self) -> Unsure:
+        """The same where every jump is known to fall on the next line."""
+        held = self.drawn.copy()
+        held[self.at[self.jump]] = held[self.at[self.jump], :1]
+        bends = ~self.jump
+        rest = (self.at[bends], self.jump[bends], self.usual[bends], self.spread[bends], self.rise[bends])
+        return Unsure(held, *rest)
+
     def held(self, share: Vector) -> Vector:
         """Samples of each interval (m,) before its jump, from 1 to r."""
         return self.every - share * (self.every - 1)

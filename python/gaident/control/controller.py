@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gaident import _core
+from gaident.control.between import jumps_between
 from gaident.control.ticks import Ticks
 from gaident.control.unknown import unknown_in
 from gaident.errors import ControllerError, SettingsError
@@ -144,6 +145,15 @@ class Controller(ABC):
         """The same at the controller's samples (n, r) where the log knows it there, r samples to a line; else of `command_of`."""
         between: Vector | None = getattr(log, "command_between", None) if self.driven_by == "command" else None
         return self.command_of(log) if between is None else between
+
+    def steps_at(self, source: Vector) -> NDArray[np.intp]:
+        """Numbers of the intervals between lines in which its torque steps with its command; source: of `source_of`.
+
+        Behind an acceleration feedforward it does not step: it is a blow within one sample.
+        """
+        if self.driven_by != "command" or any(getattr(part, "acceleration_feedforward", 0.0) != 0.0 for _, part in self.parts):
+            return np.zeros(0, dtype=np.intp)
+        return jumps_between(source[:, 0] if source.ndim > 1 else source)
 
     def start_angle(self, source: Vector) -> float:
         """Angle [rad] at which its axis rests before a log without a position; source: of `command_of`, (n,)."""

@@ -15,6 +15,7 @@ from gaident.control.pi import bare_pi
 from gaident.data.record import Record
 from gaident.errors import RecordError
 from gaident.identification.logged_torque import corrected, not_followed
+from gaident.identification.replay.command_timing import timed
 from gaident.identification.replay.driven_records import torque_driven
 from gaident.identification.space import derive_space
 from gaident.models.drive_torque import as_old_as_its_velocity, straight_driven
@@ -49,10 +50,12 @@ class Looped(NamedTuple):
 def looped_over(records: Sequence[Record], controller: Controller | None, space: object, from_rest: bool = True) -> Looped:
     """What an identification of the records does under a controller; space: the search space, or None. Raises RecordError.
 
+    They are `timed`, and what leaves here knows when its command jumped.
     from_rest: False: every record has a start state of its own, which the equation from line to line has not.
     Where a logged torque shows that a controller faster than the log is not the drive's, one number of it is what the torque
     shows or, where it does not follow with any one, the torque drives the model, straight between the lines.
     """
+    records = timed(records, controller)
     doubts = not_followed(records, controller)
     if from_rest and line_equation(records, controller, space if isinstance(space, SearchSpace) else None):
         if not doubts or any(r.torque is None for r in records):

@@ -26,8 +26,8 @@ from gaident.identification.controller_numbers import with_estimates
 from gaident.identification.noise import Autoregression, autoregression_of, highest_order
 from gaident.identification.notes import record_notes, unseen_notes, warnings_of
 from gaident.identification.parts import search_parts
-from gaident.identification.replay.command_timing import timed
 from gaident.identification.replay.notes import replay_notes
+from gaident.identification.replay.timed_record import plain_of
 from gaident.identification.selection import Candidate
 from gaident.messages import Message
 from gaident.models.mechanics import mechanics_from_model
@@ -125,7 +125,6 @@ def identify(
     settings = Settings() if settings is None else settings
     if not isinstance(settings, Settings):
         raise SettingsError(f"settings is {settings!r}: give a gaident.Settings")
-    checked = list(timed(checked, numbers.controller))
     looped = looped_over(checked, simplest(numbers.controller, (r.dt for r in checked)), space, settings.initial_state != "free")
     given, loop = looped.records, looped.controller
     check_numbers(trials, seed, workers)
@@ -370,7 +369,7 @@ class _Work:
             digests=tuple(self.digests),
             initial_states=states,
             version=version(),
-            records=tuple(self.records),
+            records=tuple(map(plain_of, self.records)),
         )
 
     def outcome(self, trial: _core.Trial) -> TrialOutcome:

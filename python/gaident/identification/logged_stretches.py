@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gaident.control import core
-from gaident.control.between import at_the_clock, between_lines, jumps_between
+from gaident.control.between import at_the_clock, between_lines
 from gaident.control.cascade import Cascade
 from gaident.control.pi import PI
 from gaident.control.ticks import push_of, smooth_between
@@ -78,7 +78,7 @@ class Log:
         every = len(self.velocity) // len(self.source)
         ticks, loop = cascade.ticks(self.dt, self.between, None), cascade.core_loop(self.dt)
         made = partial(core.servo_torque, self.dt, ticks, servo=loop)
-        return push_of(self.velocity[::every], every, made, jumps_between(self.source))
+        return push_of(self.velocity[::every], every, made, cascade.steps_at(self.source))
 
 
 def log_of(rec: Record, share: int, cascade: Cascade, whole: bool) -> Log:

@@ -28,7 +28,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gaident.control import core
-from gaident.control.between import jumps_between
 from gaident.control.controller import Controller
 from gaident.control.pi import bare_pi
 from gaident.control.pi_torque import pi_torque
@@ -101,9 +100,7 @@ def made_at_its_clock(rec: Record, controller: Controller, stored: float = 0.0) 
     def made(velocity: Vector) -> Vector:
         return core.servo_torque(rec.dt, ticks, velocity, loop, stored)
 
-    lines = source[:, 0] if source.ndim > 1 else source
-    jumps = jumps_between(lines) if controller.driven_by == "command" else np.zeros(0, dtype=np.intp)
-    return made(pushed_between(rec.velocity, controller.log_every(rec.dt), made, jumps))
+    return made(pushed_between(rec.velocity, controller.log_every(rec.dt), made, controller.steps_at(source)))
 
 
 def late(torque: Vector, delay: float, before: float) -> Vector:

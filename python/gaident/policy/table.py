@@ -251,6 +251,15 @@ class Decisions:
         "times the change to the line before or after: a command that changes more between two lines jumps there",
         SLOWER,
     )
+    jumped_early: float = loop(
+        0.75,
+        "samples",
+        "by which a jump between two lines comes before the later one at least; half a one is other things",
+        SLOWER,
+    )
+    told_time: float = loop(
+        0.25, "samples", "deviation of a jump's time that the torque alone tells; else the velocity has to", SLOWER
+    )
     same_clock: float = loop(
         0.5, "1", "of the least error from line to line: two sample times whose errors differ by less are not told apart", PERIODS
     )

@@ -67,10 +67,45 @@ def test_short_ramps_are_told_from_jumps() -> None:
     assert means_off(found.command_between, whole, every) < 0.7
 
 
-@pytest.mark.parametrize("every", [2, 8])
-def test_jumps_on_the_lines_stay_there(every: int) -> None:
-    rec = record(levels(every, 5, on_lines=True), every)
+ON_LINES = {
+    "bare": LOOP,
+    "P alone": ga.Cascade(ga.PI(0.1, 0.0), T),
+    "backward": ga.Cascade(ga.PI(0.1, 6.0, rule="backward"), T),
+    "feedforward": ga.Cascade(ga.PI(0.1, 6.0), T, acceleration_feedforward=4e-4),
+    "hold": ga.Cascade(ga.PI(0.1, 6.0, torque_limit=3.0, anti_windup="hold"), T),
+    "tracking": ga.Cascade(ga.PI(0.1, 6.0, torque_limit=3.0, anti_windup="tracking", tracking_time=0.01), T),
+    "winds up": ga.Cascade(ga.PI(0.1, 6.0, torque_limit=3.0), T),
+}
+
+
+@pytest.mark.parametrize("every", [2, 4, 8])
+@pytest.mark.parametrize("name", ON_LINES)
+def test_jumps_on_the_lines_stay_there(every: int, name: str) -> None:
+    """Also where the velocity alone would tell, which is half a sample old, and bent by the shaft."""
+    loop = ON_LINES[name]
+    for seed in (5, 9):
+        rec = record(levels(every, seed, on_lines=True), every, loop)
+        assert timed([rec], loop)[0] is rec
+
+
+def test_another_rule_of_integration_is_no_jump_half_a_sample_early() -> None:
+    rec = record(levels(8, 9, on_lines=True), 8, ON_LINES["backward"])
     assert timed([rec], LOOP)[0] is rec
+
+
+def test_a_record_in_motion_tells_no_time() -> None:
+    """Whether its torque follows from the controller cannot be seen: with kp 10 % off jumps on the lines were moved."""
+    rec = record(levels(8, 9, on_lines=True), 8)[150:]
+    wrong = ga.Cascade(ga.PI(0.09, 6.0), T)
+    assert timed([rec], wrong)[0] is rec
+
+
+def test_what_is_identified_contains_the_records_as_they_were_logged() -> None:
+    rec = record(levels(8, 9), 8)
+    idn = ga.identify(rec, LOOP, seed=1)
+    assert type(idn.records[0]) is ga.Record and idn.records[0] == rec
+    (found,) = timed([rec], LOOP)
+    assert isinstance(found, TimedRecord) and type(timed([found], ga.Cascade(ga.PI(None, None), T))[0]) is ga.Record
 
 
 def test_what_tells_nothing_changes_nothing() -> None:

@@ -39,9 +39,9 @@ from gaident.control.filtering import filtered
 from gaident.data.record import Record
 from gaident.data.torque_kind import COMMANDED
 from gaident.identification.logged_stretches import Log, log_of, unlimited
-from gaident.identification.logged_torque import not_followed
+from gaident.identification.logged_torque import comparable, not_followed
 from gaident.identification.noise import Autoregression, autocorrelation, autoregression_of, highest_order
-from gaident.identification.replay.timed_record import TimedRecord
+from gaident.identification.replay.timed_record import TimedRecord, plain_of
 from gaident.models.starts import noise_std
 from gaident.policy.table import POLICY
 
@@ -64,21 +64,27 @@ def timed(records: Sequence[Record], controller: Controller | None) -> tuple[Rec
     """The records, those that know when their command changed between their lines as `TimedRecord`.
 
     They know it where the log is slower than its controller, that is driven by a velocity command and known, and a commanded
-    torque is logged, which then follows from this controller: one that is not the drive's, or another limit, is no time.
+    torque is logged from rest, which then follows from this controller: one that is not the drive's, or another limit, is no
+    time.
     A record that is timed already is timed anew.
     """
+    plain = tuple(plain_of(rec) for rec in records)
     if controller is None or controller.unknown or controller.driven_by != "command":
-        return tuple(records)
-    return tuple(_timed(rec.plain if isinstance(rec, TimedRecord) else rec, controller) for rec in records)
+        return plain
+    return tuple(_timed(rec, controller) for rec in plain)
 
 
 def _timed(rec: Record, controller: Controller) -> Record:
     every = controller.log_every(rec.dt)
-    if every == 1 or rec.command is None or rec.torque is None or rec.torque_is != COMMANDED or len(rec) < POLICY.least_samples:
+    if every == 1 or rec.command is None or rec.torque_is != COMMANDED or not comparable(rec, controller):
         return rec
     unsure = unsure_between(rec.command, every)
     timing = _Timing.of(rec, cascade_of(controller), unsure)
-    if not len(unsure.at) or np.sum(timing.used) < POLICY.least_samples:
+    if (
+        not len(unsure.at)
+        or (np.any(unsure.jump) and not len(controller.steps_at(rec.command)))
+        or np.sum(timing.used) < POLICY.least_samples
+    ):
         return rec
     between = timing.solved()
     if between is None:
@@ -95,6 +101,15 @@ class _Seen(NamedTuple):
 
     weight: Vector
     right: Vector
+    gained: float
+
+
+class _Shares(NamedTuple):
+    """Shares (m,), of which the torque by itself tells so much, the command at the samples (n, r), and 2 ln(evidence) gained."""
+
+    share: Vector
+    told: NDArray[np.bool_]
+    command: Vector
     gained: float
 
 
@@ -116,7 +131,7 @@ class _Timing:
         log = log_of(rec, len(rec), cascade, whole=False)
         every, stretch = unsure.every, log.stretch
         used = (stretch[1:] >= 0) & (stretch[1:] == stretch[:-1])
-        used = np.convolve(used, np.ones(2 * BESIDE + 1), "same") > 2 * BESIDE
+        used = np.convolve(np.pad(used, BESIDE, constant_values=True), np.ones(2 * BESIDE + 1), "valid") > 2 * BESIDE
         free = replace(cascade, velocity=unlimited(cascade.velocity))
         count = min(POLICY.filter_memory, len(rec))
         still = np.zeros((count, every))
@@ -131,19 +146,38 @@ class _Timing:
         return np.where(self.used, np.diff(self.log.torque - made), 0.0)
 
     def solved(self) -> Vector | None:
-        """The command at the samples (n, r); None where its lines explain the torque as well."""
+        """The command at the samples (n, r); None where its lines explain the torque as well.
+
+        Jumps fall on samples: where none of those that the torque tells came early by one, all of them fell on the lines.
+        Half a sample is the age of a velocity, or another rule of integration.
+        """
+        found = self.shares()
+        jumps = found.told & self.unsure.jump
+        if np.any(self.unsure.jump) and np.all(found.share[jumps] * (self.unsure.every - 1) < POLICY.jumped_early):
+            bends = self.unsure.with_jumps_on_lines()
+            if not len(bends.at):
+                return None
+            found = replace(self, unsure=bends).shares()
+        return found.command if found.gained > POLICY.rival_margin else None
+
+    def shares(self) -> _Shares:
+        """The shares with the highest probability."""
         from scipy.sparse import diags_array
 
         unsure = self.unsure
         usual, spread = unsure.usual, unsure.spread
         share = usual.copy()
-        for _ in range(ROUNDS):
+        noise = self.noise_of(self.off(unsure.early(share)))
+        for round_ in range(ROUNDS):
+            if round_ == ROUNDS - 1:
+                share = self.on_lines_where_closer(share, noise)
             off = self.off(unsure.early(share))
             noise = self.noise_of(off)
             white = self.whitened(off[None, :], noise)[0]
             columns = self.columns(share, noise)
             normal = (columns.T @ columns).tocsc()
-            seen = self.seen(share, normal.diagonal() * spread**2 < 1.0)  # no decision: where the prior tells more
+            told = normal.diagonal() * POLICY.told_time**2 >= (unsure.every - 1) ** 2
+            seen = self.seen(share, ~told)
             normal = (normal + diags_array(seen.weight)).tocsc()
             share = np.clip(share + self.step(normal, columns.T @ white + seen.right, usual - share), 0.0, 1.0)
         left, lines = (
@@ -152,7 +186,15 @@ class _Timing:
         )
         prior = float(np.sum(((share - usual) / spread) ** 2))
         gained = lines - left + seen.gained - prior - self.log_det(normal)
-        return unsure.early(share) if gained > POLICY.rival_margin else None
+        return _Shares(share, told, unsure.early(share), gained)
+
+    def on_lines_where_closer(self, share: Vector, noise: Autoregression) -> Vector:
+        """Shares (m,), of each jump 0 where that leaves less around it: a limit between the lines makes other minima."""
+        none = np.where(self.unsure.jump, 0.0, share)
+        size = [np.cumsum(self.whitened(self.off(self.unsure.early(s))[None, :], noise)[0] ** 2) for s in (share, none)]
+        end = np.minimum(self.unsure.at + len(WINDOW), len(self.used) - 1)
+        early, on_line = (x[end] - x[np.maximum(self.unsure.at - 1, 0)] for x in size)
+        return np.where(on_line < early, none, share)
 
     def seen(self, share: Vector, blind: NDArray[np.bool_]) -> _Seen:
         """What the velocity tells of the jumps (m,) of which the torque tells nothing, as where a limit acts on either side.
@@ -187,7 +229,8 @@ class _Timing:
         std = max(noise_std(line - c * here), float(np.finfo(np.float64).eps) * float(np.abs(line).max()))
         told, sure, pull = ~blind[jump], np.sum(change**2, axis=1), np.sum(change * left, axis=1)
         late = float(np.sum(pull[told]) / np.sum(sure[told])) if np.any(sure[told] > 0.0) else 0.0
-        left, on_lines = ((x - late * change)[~told] for x in (left, on_lines))
+        late_on_lines = float(np.sum(change * on_lines) / max(np.sum(sure), np.finfo(np.float64).tiny))
+        left, on_lines = (left - late * change)[~told], (on_lines - late_on_lines * change)[~told]
         weight[jump] = np.where(told, 0.0, sure / std**2)
         right[jump] = np.where(told, 0.0, (pull - late * sure) / std**2)
         return _Seen(weight, right, float(np.sum(on_lines**2) - np.sum(left**2)) / std**2)

@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from gaident.data.record import CHANNELS, Record
 
-__all__ = ["TimedRecord"]
+__all__ = ["TimedRecord", "plain_of"]
 
 Matrix = NDArray[np.float64]
 
@@ -29,6 +29,7 @@ class TimedRecord(Record):
         made = object.__new__(cls)
         channels = {key: getattr(rec, key) for key in CHANNELS}
         about = {"name": rec.name, "torque_is": rec.torque_is, "notes": rec.notes}
+        between.flags.writeable = False
         made._fill(rec.dt, channels, command_between=between, **about)
         return made
 
@@ -43,8 +44,9 @@ class TimedRecord(Record):
     def with_channels(self, *, dt: float | None = None, torque_is: str | None = None, **changed: ArrayLike | None) -> Record:
         """See `Record`; another command, or sample time, is one between whose lines nothing is known."""
         made = self.plain.with_channels(dt=dt, torque_is=torque_is, **changed)
-        same = dt is None and "command" not in changed and self.command_between is not None
-        return TimedRecord.of(made, self.command_between) if same and self.command_between is not None else made
+        if dt is not None or "command" in changed or self.command_between is None:
+            return made
+        return TimedRecord.of(made, self.command_between)
 
     def _cut(self, start: int, stop: int, text: str) -> Record:
         part = self.plain._cut(start, stop, text)
@@ -52,3 +54,8 @@ class TimedRecord(Record):
 
     def __reduce__(self) -> tuple[Any, ...]:
         return TimedRecord.of, (self.plain, self.command_between)
+
+
+def plain_of(rec: Record) -> Record:
+    """The record as it was logged."""
+    return rec.plain if isinstance(rec, TimedRecord) else rec
