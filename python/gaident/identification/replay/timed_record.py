@@ -29,7 +29,7 @@ class TimedRecord(Record):
         made = object.__new__(cls)
         channels = {key: getattr(rec, key) for key in CHANNELS}
         about = {"name": rec.name, "torque_is": rec.torque_is, "notes": rec.notes}
-        between.flags.writeable = False
+        between.setflags(write=False)
         made._fill(rec.dt, channels, command_between=between, **about)
         return made
 
