@@ -172,7 +172,7 @@ def unsure_between(line: Vector, every: int) -> Unsure:
     """What the lines of a velocity command (n,) [rad/s] do not tell."""
     steps = np.diff(line)
     bends = np.diff(steps)
-    before, after = np.append(0.0, bends), np.append(bends, 0.0)
+    before, after = np.append(steps[:1], bends), np.append(bends, -steps[-1:])  # it stands before the record and behind it
     least = POLICY.rounded_command * float(np.abs(line).max(initial=0.0))
     met = np.zeros(len(steps), dtype=np.bool_)
     met[_bends(steps)[0]] = True

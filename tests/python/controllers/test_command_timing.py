@@ -56,6 +56,16 @@ def test_the_torque_tells_when_the_command_jumped(every: int, loop: ga.Cascade) 
     assert means_off(found.command_between, whole, every) < 0.5
 
 
+@pytest.mark.parametrize("every", [2, 8])
+def test_a_jump_in_the_first_interval_is_told_as_well(every: int) -> None:
+    """As in a trace that a step of the command has triggered."""
+    whole = np.where(np.arange(500 * every) < every // 2, 0.0, 30.0)
+    whole[200 * every + 1 :] = 0.0
+    (found,) = timed([record(whole, every)], LOOP)
+    assert isinstance(found, TimedRecord) and found.command_between is not None
+    assert means_off(found.command_between, whole, every) < 0.5
+
+
 def test_short_ramps_are_told_from_jumps() -> None:
     """A ramp that begins and ends within two lines."""
     every = 8

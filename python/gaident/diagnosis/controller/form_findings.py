@@ -20,7 +20,6 @@ from gaident.diagnosis.controller.period_shown import FASTER, Period, period_sho
 from gaident.diagnosis.controller.slow_forms import run_error
 from gaident.diagnosis.library.settings import OF_SETTING
 from gaident.identification.controller_numbers import Numbers, with_estimates
-from gaident.identification.logged_torque import comparable, not_followed
 from gaident.identification.replay.command_timing import timed
 from gaident.identification.replay.replay import replay
 from gaident.models.drive_torque import driven_by
@@ -98,24 +97,12 @@ class Loop:
 def loop_of(records: Sequence[Record], given: Controller | None) -> Loop:
     """The controller with estimates for what is None and, where a log has fewer lines than a bare PI in a Cascade has samples,
     in the form that the logged torque shows."""
-    records = records if _by_another_rule(records, given) else timed(records, given)
+    records = timed(records, given)
     period = period_shown(records, given)
     if period is None or period.controller is given:  # none, or no sure one
         period = _formed(records, given) or period
     found = _loop_of(records, given if period is None else period.controller)
     return found if period is None else replace(found, period_notes=(period.note,))
-
-
-def _by_another_rule(records: Sequence[Record], given: Controller | None) -> bool:
-    """Whether another rule of integration makes the torque of slow logs: it has no number, the times of jumps have many.
-
-    It moves the integral at a jump by half a sample, as a jump half a sample later does.
-    """
-    pi, every = _alone(given, records)
-    if pi is None or pi.unknown or every == 1:
-        return False
-    others = [Cascade(replace(pi, rule=rule), records[0].dt / every) for rule in RULES]
-    return all(comparable(r, others[0]) for r in records) and any(not not_followed(records, other) for other in others)
 
 
 def _formed(records: Sequence[Record], given: Controller | None) -> Period | None:
