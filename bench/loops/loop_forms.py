@@ -1,13 +1,13 @@
 """Which form of controller a diagnosis finds, where only a bare PI is given and the drive's loop is another.
 
     python bench/loops/loop_forms.py --out forms.jsonl [--cases 1] [--seed 1] [--loops NAME ...] [--every 1 2 4 8]
-        [--effects NAME ...] [--drives servo] [--no-torque] [--bits 17 24]
+        [--effects NAME ...] [--drives servo] [--jumps] [--no-torque] [--bits 17 24]
     python bench/loops/loop_forms.py --out forms.jsonl --report
 
 Drives as in industry (tests/python/support/loop_cases.py): 60 to 500 Hz, inertia ratio 0.3 to 10, a current loop of 0.1 to
 0.5 ms, an encoder of 17 to 24 bits, a torque limit reached in a third.
 With --drives servo those of the group `loops` of bench/blind.py: small servo axes of one and two masses without a current loop,
-white noise and an encoder in turn.
+white noise and an encoder in turn; --jumps: under a command that jumps at any of the controller's samples.
 The log has a line for every 1, 2, 4 and 8 samples of the controller.
 The controller that is given is PI(kp, ki), in a Cascade of the right period where the log is slower.
 --bare gives the PI alone there too; --unknown gives None for both gains; --no-torque leaves the torque out of the log.
@@ -35,7 +35,7 @@ import numpy as np
 from json_lines import read, work
 
 import gaident as ga
-from drive_cases import random_case
+from drive_cases import ANYWHERE, random_case
 from drive_rig import COUPLING, Noise
 from loop_cases import CURRENT_LOOP, EVERY, INDUSTRY_BITS, LOOPS, industrial_plant, loop_kind, loop_noise, loop_plant
 
@@ -75,12 +75,13 @@ class Case:
     given: str = "period"
     drives: str = DRIVES[0]
     torque: bool = True
+    jumps: bool = False  # of the command, at any of the controller's samples
     bits: tuple[int, int] = INDUSTRY_BITS  # of an industrial drive's encoder, from the first up to below the second
 
     @property
     def key(self) -> str:
         """Its name in the file; what is as always is left out."""
-        more = [*([self.drives] if self.drives != DRIVES[0] else []), *([] if self.torque else ["no torque"])]
+        more = [*([self.drives] if self.drives != DRIVES[0] else []), *(["jumps"] if self.jumps else []), *([] if self.torque else ["no torque"])]
         more += [f"{self.bits[0]} to {self.bits[1] - 1} bits"] if self.bits != INDUSTRY_BITS else []
         return "/".join([self.loop, str(self.every), self.effect, str(self.number), self.given, *more])
 
@@ -94,9 +95,11 @@ class Case:
         loop, every, effect, number = self.loop, self.every, self.effect, self.number
         rng = np.random.default_rng([number, zlib.crc32(f"{loop} {every} {effect}".encode())])
         if self.drives == "servo":
-            plant = loop_plant(loop, every, rng, True if {effect} & {*COUPLING, "extra_resonance"} else None)
-            noise = loop_noise("white" if rng.integers(2) else "encoder", number)
-            return random_case(number, (effect,) if effect else (), loop_kind(loop), noise, self.torque, plant=plant)
+            two = True if {effect} & {*COUPLING, "extra_resonance"} else None
+            kind, encoder = (ANYWHERE[-1], "differenced") if self.jumps else (loop_kind(loop), "encoder")
+            plant = loop_plant(loop, every, rng, two, kind if self.jumps else None)
+            noise = loop_noise("white" if rng.integers(2) else encoder, number)
+            return random_case(number, (effect,) if effect else (), kind, noise, self.torque, plant=plant)
         plant = industrial_plant(loop, every, rng)
         factor = float(rng.uniform(*CURRENT_LOOP)) / 1e-3
         noise = Noise(white=0.0, encoder=2 * np.pi / 2.0 ** int(rng.integers(*self.bits)), differenced=True)
@@ -194,6 +197,7 @@ def main() -> None:
     parser.add_argument("--every", nargs="+", type=int, choices=EVERY, default=list(EVERY))
     parser.add_argument("--effects", nargs="+", default=[""], help="hidden beside the current loop; default: none")
     parser.add_argument("--drives", choices=DRIVES, default=DRIVES[0])
+    parser.add_argument("--jumps", action="store_true", help="of the command, with --drives servo")
     parser.add_argument("--no-torque", action="store_true", help="leave the torque out of the log")
     parser.add_argument("--bare", action="store_true", help="give the PI alone where the log is slower, too")
     parser.add_argument("--unknown", action="store_true", help="give PI(kp=None, ki=None)")
@@ -207,7 +211,7 @@ def main() -> None:
     if not options.report:
         there = read(options.out)
         cases = [
-            Case(loop, every, effect, options.seed * 1000 + k, given, options.drives, not options.no_torque, bits)
+            Case(loop, every, effect, options.seed * 1000 + k, given, options.drives, not options.no_torque, options.jumps, bits)
             for k in range(options.cases)
             for loop in options.loops
             for every in options.every

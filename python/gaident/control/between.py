@@ -12,7 +12,7 @@ by b, moves the mean by up to b/8, and the lines show only a part of a ramp that
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -144,6 +144,12 @@ class Unsure:
         bends = ~self.jump
         rest = (self.at[bends], self.jump[bends], self.usual[bends], self.spread[bends], self.rise[bends])
         return Unsure(held, *rest)
+
+    def on_samples(self, share: Vector) -> Unsure:
+        """The same where every jump is known to fall on the sample next to such shares (m,)."""
+        steps = self.every - 1
+        usual = np.where(self.jump, np.round(share * steps) / steps, self.usual)
+        return replace(self, usual=usual, spread=np.where(self.jump, POLICY.negligible / steps, self.spread))
 
     def held(self, share: Vector) -> Vector:
         """Samples of each interval (m,) before its jump, from 1 to r."""

@@ -3,39 +3,21 @@
 from __future__ import annotations
 
 import pickle
-from typing import Any
 
 import numpy as np
 import pytest
 
 import gaident as ga
-from drive_rig import Plant, run_drive, skip_without_library
+from drive_rig import skip_without_library
 from gaident.control.between import between_lines, unsure_between
 from gaident.identification.replay.command_timing import timed
 from gaident.identification.replay.timed_record import TimedRecord
+from jump_logs import T, levels, record
 
-T = 125e-6
 LOOP = ga.Cascade(ga.PI(0.1, 6.0), T)
 FILTERED = ga.Cascade(ga.PI(0.1, 6.0, rule="backward"), T, torque_filters=(ga.LowPass(0.3e-3),))
 
 skip_without_library()
-
-
-def levels(every: int, seed: int, on_lines: bool = False) -> np.ndarray:
-    """Levels [rad/s] that begin at any of a controller's samples, at least 60 lines each; (1000 every,)."""
-    rng, whole, at = np.random.default_rng(seed), np.zeros(1000 * every), 100
-    while at < 1000:
-        whole[at * every + (0 if on_lines else int(rng.integers(every))) :] = rng.uniform(-40.0, 40.0)
-        at += int(rng.integers(60, 150))
-    return whole
-
-
-def record(whole: np.ndarray, every: int, loop: ga.Cascade = LOOP, **more: Any) -> ga.Record:
-    """The log of two masses under this command at the controller's samples [rad/s], every so-many-th of them."""
-    axis = Plant(J=4e-4, D=1e-3, JL=4e-4, DL=1e-3, KG=60.0, DG=5e-3, kp=0.1, ki=6.0, dt=every * T, cascade=loop)
-    log = run_drive(axis, whole, more, encoder=2 * np.pi / 2**20, differenced=True)
-    lines = {"velocity": log.velocity, "torque": log.torque, "command": whole}
-    return ga.Record(every * T, **{name: x[::every] for name, x in lines.items()})
 
 
 def means_off(command: np.ndarray, whole: np.ndarray, every: int) -> float:
@@ -61,7 +43,7 @@ def test_a_jump_in_the_first_interval_is_told_as_well(every: int) -> None:
     """As in a trace that a step of the command has triggered."""
     whole = np.where(np.arange(500 * every) < every // 2, 0.0, 30.0)
     whole[200 * every + 1 :] = 0.0
-    (found,) = timed([record(whole, every)], LOOP)
+    (found,) = timed([record(whole, every, LOOP)], LOOP)
     assert isinstance(found, TimedRecord) and found.command_between is not None
     assert means_off(found.command_between, whole, every) < 0.5
 
@@ -70,7 +52,7 @@ def test_short_ramps_are_told_from_jumps() -> None:
     """A ramp that begins and ends within two lines."""
     every = 8
     whole = np.convolve(levels(every, 3), np.ones(7) / 7)[: 1000 * every]
-    rec = record(whole, every)
+    rec = record(whole, every, LOOP)
     (found,) = timed([rec], LOOP)
     assert isinstance(found, TimedRecord) and found.command_between is not None
     assert means_off(between_lines(whole[::every], every), whole, every) > 10.0
@@ -105,13 +87,13 @@ def test_another_rule_of_integration_is_no_jump_half_a_sample_early() -> None:
 
 def test_a_record_in_motion_tells_no_time() -> None:
     """Whether its torque follows from the controller cannot be seen: with kp 10 % off jumps on the lines were moved."""
-    rec = record(levels(8, 9, on_lines=True), 8)[150:]
+    rec = record(levels(8, 9, on_lines=True), 8, LOOP)[150:]
     wrong = ga.Cascade(ga.PI(0.09, 6.0), T)
     assert timed([rec], wrong)[0] is rec
 
 
 def test_what_is_identified_contains_the_records_as_they_were_logged() -> None:
-    rec = record(levels(8, 9), 8)
+    rec = record(levels(8, 9), 8, LOOP)
     idn = ga.identify(rec, LOOP, seed=1)
     assert type(idn.records[0]) is ga.Record and idn.records[0] == rec
     (found,) = timed([rec], LOOP)
@@ -120,7 +102,7 @@ def test_what_is_identified_contains_the_records_as_they_were_logged() -> None:
 
 def test_what_tells_nothing_changes_nothing() -> None:
     whole = levels(8, 6)
-    rec = record(whole, 8)
+    rec = record(whole, 8, LOOP)
     assert timed([rec], None) == (rec,)
     unknown = ga.Cascade(ga.PI(None, None), T)
     for one, loop in (
@@ -128,7 +110,7 @@ def test_what_tells_nothing_changes_nothing() -> None:
         (rec.with_channels(torque_is="measured"), LOOP),
         (rec, unknown),
         (rec, ga.PI(0.1, 6.0)),
-        (record(whole, 1), LOOP),
+        (record(whole, 1, LOOP), LOOP),
     ):
         assert timed([one], loop)[0] is one
 
@@ -143,7 +125,7 @@ def test_a_limit_that_acts_between_the_lines_tells_no_time() -> None:
 
 def test_a_timed_record_is_cut_and_changed_like_any_other() -> None:
     whole = levels(4, 8)
-    rec = record(whole, 4)
+    rec = record(whole, 4, LOOP)
     (found,) = timed([rec], LOOP)
     assert isinstance(found, TimedRecord) and found.command_between is not None
     part = found[100:400]
@@ -174,19 +156,19 @@ def test_shares_are_means_between_the_lines(every: int) -> None:
 def test_jumps_between_the_lines_are_no_cause() -> None:
     """They were named as friction, a resonance, a delay; J was 2 to 30 % off."""
     for every, seed in ((4, 2), (8, 3)):
-        dia = ga.diagnose(record(levels(every, seed), every), LOOP)
+        dia = ga.diagnose(record(levels(every, seed), every, LOOP), LOOP)
         assert (dia.verdict, [f.effect for f in dia.causes]) == ("adequate", []), every
         assert dia.mechanics["motor_inertia"].value == pytest.approx(4e-4, rel=5e-3)
         assert dia.mechanics["load_inertia"].value == pytest.approx(4e-4, rel=5e-3)
 
 
 def test_friction_is_named_under_jumps_between_the_lines() -> None:
-    rec = record(levels(8, 4), 8, coulomb_friction={"torque": 0.05})
+    rec = record(levels(8, 4), 8, LOOP, coulomb_friction={"torque": 0.05})
     dia = ga.diagnose(rec, LOOP)
     assert [f.effect for f in dia.causes] == ["coulomb_friction"]
     assert dia.causes[0].parameters["torque"].value == pytest.approx(0.05, rel=0.05)
 
 
 def test_an_identification_takes_the_means_between_the_lines() -> None:
-    idn = ga.identify(record(levels(8, 9), 8), LOOP, seed=1)
+    idn = ga.identify(record(levels(8, 9), 8, LOOP), LOOP, seed=1)
     assert pytest.approx(8e-4, rel=5e-3) == idn.mechanics.J

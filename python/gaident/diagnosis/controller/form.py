@@ -11,7 +11,7 @@ from gaident.control.cascade import Cascade
 from gaident.control.filters import LowPass
 from gaident.control.found import FoundNumbers, loosened
 from gaident.control.pi import PI, RULES
-from gaident.diagnosis.controller.form_regression import Shape, at_places
+from gaident.diagnosis.controller.form_regression import Law, Shape, at_places
 
 __all__ = [
     "FEEDS",
@@ -96,10 +96,11 @@ class Form:
 
 @dataclass(frozen=True, eq=False)
 class FormCandidate:
-    """A form with the filters of a shape; free: its free numbers; count of them; criterion: the less the better."""
+    """A form with the filters of a shape of this regression; free: its numbers; count of them; criterion: less is better."""
 
     form: Form
     shape: Shape
+    law: Law
     free: Vector  # z, then by how much the filters' numbers move
     count: int
     criterion: float

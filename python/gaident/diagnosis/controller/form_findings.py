@@ -22,6 +22,7 @@ from gaident.diagnosis.library.settings import OF_SETTING
 from gaident.identification.controller_numbers import Numbers, with_estimates
 from gaident.identification.replay.command_timing import timed
 from gaident.identification.replay.replay import replay
+from gaident.identification.replay.timed_record import plain_of
 from gaident.models.drive_torque import driven_by
 from gaident.policy.table import POLICY
 from gaident.results.estimate import Estimate
@@ -125,7 +126,7 @@ def _formed(records: Sequence[Record], given: Controller | None) -> Period | Non
     unsaid = [(r, said) for r in records if (said := replay(r, pi)).follows is False]
     if not unsaid or any(said.cause not in ("", "gains") for _, said in unsaid):
         return None
-    found = {every: shown for every in FASTER if (shown := form_shown(records, pi, (), every)) is not None}
+    found = {every: shown for every in FASTER if (shown := form_shown(records, pi, (), every, between=False)) is not None}
     gains = [(r, said.controller) for r, said in unsaid if said.controller is not None and said.cause == "gains"]
     if len(gains) == len(unsaid):
         left = max(run_error([r], Cascade(c, dt)) / run_error([r], Cascade(pi, dt)) for r, c in gains)
@@ -157,7 +158,8 @@ def _loop_of(records: Sequence[Record], given: Controller | None) -> Loop:
     if pi is None or every == 1 or any(r.torque is None or r.command is None for r in records):
         return as_given
     unknown = {f"velocity.{name}": name for name in ("kp", "ki")}
-    shown = form_shown(records, pi, tuple(unknown[n] for n in numbers.estimates if n in unknown), every)
+    # As they were logged: with another controller the torque may tell other times.
+    shown = form_shown([plain_of(r) for r in records], pi, tuple(unknown[n] for n in numbers.estimates if n in unknown), every)
     if shown is None or (not numbers.estimates and left_by_a_limit(records, Cascade(pi, dt / every)) < shown.rms):
         return replace(as_given, numbers=numbers.trusted())  # or a single limit, which the simulated loop shows, explains more
     estimates = {f"velocity.{name}": e for name, e in _estimates(shown.estimated).items()}

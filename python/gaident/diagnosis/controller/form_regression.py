@@ -23,6 +23,7 @@ from gaident.control.filtering import filtered
 from gaident.control.filters import LowPass, Notch
 from gaident.control.pi import PI
 from gaident.data.record import Record
+from gaident.diagnosis.controller.lost_times import LostTimes
 from gaident.identification.logged_stretches import centred, correlation_of, log_of, numbered, whitened
 from gaident.identification.logged_torque import noise_between
 from gaident.identification.number_ranges import FREQUENCIES, TIME_CONSTANTS, range_of
@@ -39,6 +40,7 @@ __all__ = [
     "bounds_of",
     "equation_of",
     "fitted_shape",
+    "grid_of",
     "law_of",
     "least",
     "quiet_law",
@@ -79,6 +81,7 @@ class Law:
     velocities: others that have the same lines [rad/s] (n r,) each; () where the log has all samples.
     straight: the velocity straight between its lines [rad/s] (n r,).
     steps: that the velocities of each record are rounded to [rad/s], where r = 1.
+    lost: where the lines do not tell when the command jumped: steps of the signals are fitted, see `lost_times`.
     """
 
     command: Vector
@@ -93,6 +96,7 @@ class Law:
     velocities: tuple[Vector, ...] = ()
     straight: Vector | None = None
     steps: tuple[float, ...] = ()
+    lost: LostTimes | None = None
 
     @property
     def others(self) -> tuple[Law, ...]:
@@ -125,10 +129,13 @@ class Law:
     @property
     def logged(self) -> Vector:
         """The torque [N m] (n used,)."""
-        return self._fitted(self.torque[None, :])[:, 0]
+        torque = self._fitted(self.torque[None, :])[:, 0]
+        return torque if self.lost is None else torque - self.lost.expected
 
     def _fitted(self, rows: Matrix) -> Matrix:
         """(n used, signals) of signals at the lines (signals, n)."""
+        if self.lost is not None:
+            return self.lost.whitened(rows)
         if self.stretch is None:
             return rows.T[self.used]
         stretch, rho = self.stretch, self.rho
@@ -283,8 +290,8 @@ def equation_of(f: Filter, period: float) -> tuple[Vector, Vector]:
     return polynomial(f.numerator_damping) / a[0], a / a[0]
 
 
-def fitted_shape(law: Law, places: tuple[Place, ...], enough: float) -> Shape:
-    """The filters' numbers that leave least, from the best starts of a grid; enough: rms [N m] that ends the search."""
+def fitted_shape(law: Law, places: tuple[Place, ...], enough: float, starts: Sequence[Vector] = ()) -> Shape:
+    """The filters' numbers that leave least, from the best of these starts, or of a grid; enough: rms [N m] that ends it."""
     from scipy.optimize import least_squares
 
     def off(numbers: Vector) -> Vector:
@@ -293,9 +300,9 @@ def fitted_shape(law: Law, places: tuple[Place, ...], enough: float) -> Shape:
         return left
 
     if not places:
-        return _solved(law, places, np.zeros(0))
+        return solved_shape(law, places, np.zeros(0))
     low, high = bounds_of(places)
-    grid = [np.concatenate(start) for start in product(*(_starts(kind) for _, kind in places))]
+    grid = starts or grid_of(places)
     costs = np.array([np.sum(off(start) ** 2) for start in grid])
     size = float(np.sqrt(np.mean(law.logged**2)))
     best: Shape | None = None
@@ -305,7 +312,7 @@ def fitted_shape(law: Law, places: tuple[Place, ...], enough: float) -> Shape:
         found = least_squares(
             lambda x: off(x) / size, inside, bounds=(low, high), xtol=1e-12, ftol=1e-6, gtol=1e-15, max_nfev=POLICY.filter_fit
         )
-        shape = _solved(law, places, found.x)
+        shape = solved_shape(law, places, found.x)
         if best is None or shape.rms < best.rms:
             best = shape
         if best.rms <= enough:
@@ -320,13 +327,18 @@ def bounds_of(places: Sequence[Place]) -> tuple[Vector, Vector]:
     return low, high
 
 
+def grid_of(places: Sequence[Place]) -> list[Vector]:
+    """Starts of the filters' numbers."""
+    return [np.concatenate([np.zeros(0), *start]) for start in product(*(_starts(kind) for _, kind in places))]
+
+
 def _starts(kind: type[LowPass] | type[Notch]) -> list[Vector]:
     if kind is LowPass:
         return [np.array([np.log(tau)]) for tau in TIME_CONSTANTS]
     return [np.array([np.log(f), zn, np.log(zd)]) for f, (zn, zd) in NOTCHES]
 
 
-def _solved(law: Law, places: tuple[Place, ...], numbers: Vector) -> Shape:
+def solved_shape(law: Law, places: tuple[Place, ...], numbers: Vector) -> Shape:
     table, sizes = _scaled(law.columns(places, numbers))
     coefficients = np.linalg.lstsq(table, law.logged, rcond=1e-12)[0]
     return Shape(places, numbers, coefficients / sizes, law.logged - table @ coefficients)

@@ -11,58 +11,33 @@ The least counts, and only if the torque follows from it: the controller runs on
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from itertools import product
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gaident.control.cascade import Cascade
 from gaident.control.found import FoundNumbers
-from gaident.control.pi import PI, RULES
+from gaident.control.pi import PI
 from gaident.data.record import Record
-from gaident.diagnosis.controller.form import (
-    FEEDS,
-    FIRST_FEED,
-    GAINS,
-    KI,
-    KP_R,
-    KP_W,
-    WEIGHTS,
-    Form,
-    FormCandidate,
-    controller_of,
-    found_of,
-    named,
-)
-from gaident.diagnosis.controller.form_regression import (
-    FILTER_SETS,
-    FILTER_SETS_OF_ONE,
-    Law,
-    Shape,
-    bounds_of,
-    fitted_shape,
-    law_of,
-    least,
-    quiet_law,
-    slope,
-)
+from gaident.diagnosis.controller.form import FEEDS, FIRST_FEED, GAINS, Form, FormCandidate, controller_of, found_of, named
+from gaident.diagnosis.controller.form_between import jumps_of
+from gaident.diagnosis.controller.form_comparison import compared, fitted_form, fitted_with_times, gains_of, rivals_of
+from gaident.diagnosis.controller.form_regression import Law, law_of, quiet_law
 from gaident.diagnosis.controller.slow_forms import limited, run_error, too_fast
 from gaident.diagnosis.library.settings import OF_SETTING
-from gaident.estimation.criterion import bic, cost_of
-from gaident.estimation.projection import inverse_of
 from gaident.identification.replay.causes import white_noise
+from gaident.identification.replay.command_timing import timed
 from gaident.identification.replay.replay import tolerance_of, velocity_steps
+from gaident.identification.replay.timed_record import TimedRecord
 from gaident.policy.table import POLICY
 
 __all__ = ["Form", "Shown", "form_shown"]
 
 Vector = NDArray[np.float64]
 Matrix = NDArray[np.float64]
-
-INSIDE = 1e-9  # no decision: a start: so far inside of its bound a search begins
-SUM_ROUNDING = 1e-9  # no decision: of the largest torque, what a sum is exact to
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,17 +67,20 @@ class Shown:
     exact: bool = False
 
 
-def form_shown(records: Sequence[Record], given: PI, unknown: tuple[str, ...] = (), every: int = 1) -> Shown | None:
+def form_shown(
+    records: Sequence[Record], given: PI, unknown: tuple[str, ...] = (), every: int = 1, between: bool = True
+) -> Shown | None:
     """The simplest controller that makes the logged torques; None where none does, or where the given PI makes them.
 
     unknown: gains of `given` that were not given but estimated. every: controller samples to a line of the log.
+    between: whether the command may have jumped between the lines, at times that are found with the form.
     """
     if given.loop != "sampled" or any(r.dt != records[0].dt for r in records):
         return None
     shown = []
     for steps in velocity_steps(records) if every == 1 else ((),):
         regression = law_of(records, given, every, steps)
-        found = None if regression is None else _form_of(records, given, unknown, *regression)
+        found = None if regression is None else _form_of(records, given, unknown, *regression, between)
         if found is not None and found.exact:
             return found
         shown.append(found)
@@ -110,30 +88,24 @@ def form_shown(records: Sequence[Record], given: PI, unknown: tuple[str, ...] = 
     return next((found for found in reversed(shown) if found is not None), None)
 
 
-def _form_of(records: Sequence[Record], given: PI, unknown: tuple[str, ...], law: Law, floor: float) -> Shown | None:
+def _form_of(
+    records: Sequence[Record], given: PI, unknown: tuple[str, ...], law: Law, floor: float, between: bool
+) -> Shown | None:
     """The same for one assumption on the log's rounding."""
-    candidates = _compared(law, given, floor, unknown)
+    candidates = compared(law, given, floor, unknown)
     if not candidates:
         return None
     if law.every > 1:
-        return _shown_slowly(records, law, given, candidates, floor)
+        following = _following(candidates, given, floor, 0.0)
+        unsure = jumps_of(records, law.every) if between and following is None else None
+        if unsure is not None:
+            told = _told(records, given, compared(law, given, floor, unknown, unsure))
+            if told is not None:
+                return _with_limit(told.records, given, told.candidates, told.fitted)
+        negligible = POLICY.negligible * float(np.abs(law.torque).max())
+        return _shown_slowly(records, given, candidates, following or _following(candidates, given, floor, negligible))
     shown = _shown(records, law, given, candidates) if candidates[0].names else None
     return shown or _shown_quietly(records, law, given, floor, unknown)
-
-
-def _compared(law: Law, given: PI, floor: float, unknown: tuple[str, ...]) -> list[FormCandidate]:
-    """Every form with every set of filters that is needed, the best first."""
-    candidates: list[FormCandidate] = []
-    followed: int | None = None
-    for places in FILTER_SETS if law.every == 1 else FILTER_SETS_OF_ONE:
-        if followed is not None and len(places) > followed:
-            break  # where only rounding or white noise is left, another filter improves nothing
-        shape = fitted_shape(law, places, floor)
-        least = float(np.hypot(floor, law.unseen(shape)))
-        if shape.rms <= POLICY.near_rounding * least or white_noise(shape.left, law.logged):
-            followed = len(places)
-        candidates += _candidates(law, shape, given, least, unknown)
-    return sorted(candidates, key=lambda c: c.criterion)
 
 
 def _allowed(records: Sequence[Record], law: Law, controller: PI) -> list[float]:
@@ -146,62 +118,10 @@ def _allowed(records: Sequence[Record], law: Law, controller: PI) -> list[float]
     ]
 
 
-def _forms(given: PI, unknown: tuple[str, ...]) -> Iterator[Form]:
-    """Every form, except integration rules that free gains reproduce exactly: no log shows these."""
-    gains: tuple[tuple[str, ...], ...] = ((), ("kp",), ("ki",), ("kp", "ki")) if given.ki else ((), ("kp",))
-    gains = tuple(free for free in gains if set(unknown) <= set(free))
-    feeds = ((), FEEDS[:1], FEEDS[1:], FEEDS)
-    for rule, free, weight, feed, starts in product(RULES, gains, WEIGHTS, feeds, (False, True)):
-        if rule != "trapezoidal" and (not given.ki or ("kp" in free and weight != "none")):
-            continue
-        yield Form(rule, free, weight, feed, starts, unknown)
-
-
-def _candidates(law: Law, shape: Shape, given: PI, floor: float, unknown: tuple[str, ...]) -> Iterator[FormCandidate]:
-    """Every form with these filters: one small least squares each, linear in the filters' numbers around those of `shape`."""
-    table = law.columns(shape.places, shape.numbers)
-    around = np.column_stack([table, _slopes(law, shape), law.logged])
-    R: Matrix = np.linalg.qr(around)[1]
-    p, n = table.shape[1], len(law.logged)
-    linear, slopes, logged = R[:, :p], R[:, p:-1], R[:, -1]
-    for form in _forms(given, unknown):
-        if form.starts and law.stretch is not None and law.every == 1:
-            continue  # each stretch has an integral of its own
-        fixed, moved = form.constraints(given, len(law.lengths))
-        B = form.of_columns(p, law.period)
-        M = np.column_stack([linear @ B @ moved, slopes])
-        wanted = logged - linear @ B @ fixed
-        free, left = least(M, wanted)
-        if np.any(np.abs(free[moved.shape[1] :]) > POLICY.slope_reach):  # the slope holds no longer
-            free, left = least(M[:, : moved.shape[1]], wanted)
-        numbers = fixed + moved @ free[: moved.shape[1]]
-        if min(numbers[KP_W], numbers[KP_R], numbers[KI]) < -POLICY.negligible * float(np.abs(numbers[:FIRST_FEED]).max()):
-            continue
-        k = M.shape[1]
-        criterion = bic(max(left / n, floor**2), n, 0) + _price(law, k, form.chosen)
-        yield FormCandidate(form, shape, free, k, float(criterion))
-
-
-def _price(law: Law, count: int, chosen: int) -> float:
-    """Cost of numbers and settings: that of the BIC; in a slower log, each must reduce the error to the share `each_number`."""
-    n = len(law.logged)
-    if law.every == 1:
-        return cost_of(count, n) + POLICY.form_choice * chosen
-    return float(-2.0 * n * np.log(POLICY.each_number) * (count + chosen))  # no decision: a formula
-
-
-def _slopes(law: Law, shape: Shape) -> Matrix:
-    """(n, filters' numbers) of the torque over each number."""
-    slopes = [
-        slope(lambda x: law.columns(shape.places, x) @ shape.coefficients, shape.numbers, k) for k in range(len(shape.numbers))
-    ]
-    return np.array(slopes).reshape(len(slopes), len(law.logged)).T
-
-
 def _shown(records: Sequence[Record], law: Law, given: PI, candidates: Sequence[FormCandidate]) -> Shown | None:
     """The best candidate fitted and run as a whole on every sample; None where the torque does not follow from it."""
     best = candidates[0]
-    numbers, filters, cov = _fitted(law, best, given)
+    numbers, filters, cov = fitted_form(best, given)
     controller = controller_of(best, numbers, filters, given, law.period)
     starts = numbers[FIRST_FEED + len(FEEDS) :]
     off, exact = [], True
@@ -218,8 +138,8 @@ def _shown(records: Sequence[Record], law: Law, given: PI, candidates: Sequence[
     return Shown(
         controller=controller,
         numbers=named(best, numbers, filters, cov, law.period),
-        gains=_gains(candidates),
-        rivals=_rivals(candidates),
+        gains=gains_of(candidates),
+        rivals=rivals_of(candidates),
         before=_rms(before),
         rms=_rms(off),
         starts=float(np.abs(starts).max()),
@@ -229,29 +149,64 @@ def _shown(records: Sequence[Record], law: Law, given: PI, candidates: Sequence[
     )
 
 
-def _shown_slowly(
-    records: Sequence[Record], law: Law, given: PI, candidates: Sequence[FormCandidate], floor: float
-) -> Shown | None:
-    """The same for a slower log; None where more is left than another velocity between its lines could make."""
-    negligible = POLICY.negligible * float(np.abs(law.torque).max())
-    # Where the given controller leaves as little, no other numbers are searched, only settings without a number of their own.
+def _simplest_first(candidates: Sequence[FormCandidate]) -> list[FormCandidate]:
+    """The forms to try: where the given gains leave as little, settings without a number of their own, before other numbers."""
     plain = [c for c in candidates if not c.names]
     as_free = [c for c in candidates if plain and c.count == plain[0].count and c.shape is plain[0].shape and not c.form.free]
-    for best in (*as_free[:1], *plain[:1], candidates[0]):
-        numbers, filters, cov = _fitted(law, best, given)
+    return [*as_free[:1], *plain[:1], candidates[0]]
+
+
+def _following(candidates: Sequence[FormCandidate], given: PI, floor: float, negligible: float) -> FormCandidate | None:
+    """The first that leaves of a slower log no more than another velocity between its lines could make; None: there is none.
+
+    negligible: what may be left in any case [N m].
+    """
+    for best in _simplest_first(candidates):
+        law, (numbers, filters, _) = best.law, fitted_form(best, given)
         left = law.logged - law.columns(best.shape.places, filters) @ (best.form.of_columns(len(numbers), law.period) @ numbers)
         least = float(np.hypot(floor, law.unseen(best.shape)))
         follows = _rms([left]) <= max(POLICY.near_rounding * least, negligible)
-        if follows and not too_fast(controller_of(best, numbers, filters, given, law.period), records[0].dt):
-            others = [best, *(c for c in candidates if c is not best)]
-            if (shown := _with_limit(records, law, given, others, (numbers, filters, cov))) is not None:
-                return shown
-            break
-    # Noise on the logged velocity leaves more than interpolation; with a limit the given controller may explain all of it.
-    for best in plain[:1]:
-        others = [best, *(c for c in candidates if c is not best)]
-        return _with_limit(records, law, given, others, _fitted(law, best, given), float(np.sqrt(POLICY.replay_left)))
+        if follows and not too_fast(controller_of(best, numbers, filters, given, law.period), law.every * law.period):
+            return best
     return None
+
+
+def _shown_slowly(
+    records: Sequence[Record], given: PI, candidates: Sequence[FormCandidate], following: FormCandidate | None
+) -> Shown | None:
+    """The same for a slower log, where a form follows, with the limits that it has; else None."""
+    if following is not None:
+        shown = _with_limit(records, given, _first(following, candidates), fitted_form(following, given))
+        if shown is not None:
+            return shown
+    # Noise on the logged velocity leaves more than interpolation; with a limit the given controller may explain all of it.
+    for best in [c for c in candidates if not c.names][:1]:
+        part = float(np.sqrt(POLICY.replay_left))
+        return _with_limit(records, given, _first(best, candidates), fitted_form(best, given), part)
+    return None
+
+
+class _Told(NamedTuple):
+    """Records whose torque tells, with the first of the candidates, when their command jumped; its numbers, see `fitted_form`."""
+
+    records: tuple[Record, ...]
+    candidates: list[FormCandidate]
+    fitted: tuple[Vector, Vector, Matrix]
+
+
+def _told(records: Sequence[Record], given: PI, candidates: Sequence[FormCandidate]) -> _Told | None:
+    """The simplest form with which the torque tells when the command jumped between the lines; None: with none."""
+    for best in _simplest_first(candidates):
+        one, fitted = fitted_with_times(best, given)
+        controller = replace(controller_of(best, *fitted[:2], given, best.law.period), period=best.law.period)
+        known = timed(records, limited(records, controller).controller)
+        if not too_fast(controller, records[0].dt) and all(isinstance(rec, TimedRecord) for rec in known):
+            return _Told(known, [one, *(c for c in candidates if c is not best)], fitted)
+    return None
+
+
+def _first(best: FormCandidate, candidates: Sequence[FormCandidate]) -> list[FormCandidate]:
+    return [best, *(c for c in candidates if c is not best)]
 
 
 def _shown_quietly(records: Sequence[Record], law: Law, given: PI, floor: float, unknown: tuple[str, ...]) -> Shown | None:
@@ -259,24 +214,23 @@ def _shown_quietly(records: Sequence[Record], law: Law, given: PI, floor: float,
     # no decision: a quarter of it where few samples are left, as the row of filter_memory says
     for memory in (POLICY.filter_memory, POLICY.filter_memory // 4):
         quiet = quiet_law(law, memory)
-        candidates = [] if quiet is None else _compared(quiet, given, floor, unknown)
+        candidates = [] if quiet is None else compared(quiet, given, floor, unknown)
         if quiet is None or not candidates:
             continue
         best = candidates[0]
-        numbers, filters, cov = _fitted(quiet, best, given)
+        numbers, filters, cov = fitted_form(best, given)
         made = quiet.columns(best.shape.places, filters) @ (best.form.of_columns(len(numbers), law.period) @ numbers)
         left = quiet.logged - made
         allowed = max(_allowed(records, law, given))
         exact = float(np.abs(left).max()) <= allowed
         if exact or white_noise(left, quiet.logged):
-            shown = _with_limit(records, quiet, given, candidates, (numbers, filters, cov))
+            shown = _with_limit(records, given, candidates, (numbers, filters, cov))
             return None if shown is None else replace(shown, exact=exact)
     return None
 
 
 def _with_limit(
     records: Sequence[Record],
-    law: Law,
     given: PI,
     candidates: Sequence[FormCandidate],
     fitted: tuple[Vector, Vector, Matrix],
@@ -288,15 +242,21 @@ def _with_limit(
     In a slower log, whose errors are no noise, it is also at most `each_number`, and the error at most that of measured noise.
     """
     best, (numbers, filters, cov) = candidates[0], fitted
+    law = best.law
     at_limit = limited(records, replace(controller_of(best, numbers, filters, given, law.period), period=law.period))
-    if not best.names and not at_limit.gain:
+    if not best.names and not at_limit.gain and (law.lost is None or not best.form.unknown):
         return None
-    before, after = run_error(records, Cascade(given, law.period)), run_error(records, at_limit.controller)
+    plain = Cascade(given, law.period)
+    # Each controller with the times at which the command jumped in its eyes.
+    before, after = (
+        run_error(records if law.lost is None else timed(records, plain), plain),
+        run_error(records, at_limit.controller),
+    )
     size = float(np.std(np.concatenate([r.torque for r in records if r.torque is not None])))
     slow = law.every > 1
     if not after < (min(part, POLICY.each_number) if slow else part) * before or (slow and after > POLICY.replay_noise * size):
         return None
-    differs, gains = named(best, numbers, filters, cov, law.period), _gains(candidates)
+    differs, gains = named(best, numbers, filters, cov, law.period), gains_of(candidates)
     if at_limit.limit is not None:
         differs[OF_SETTING["torque_limit"]] = {"limit": (at_limit.limit, at_limit.std)}
         gains[OF_SETTING["torque_limit"]] = at_limit.gain
@@ -304,7 +264,7 @@ def _with_limit(
         controller=at_limit.controller,
         numbers=differs,
         gains=gains,
-        rivals=_rivals(candidates),
+        rivals=rivals_of(candidates),
         before=before,
         rms=after,
         starts=0.0,
@@ -313,75 +273,9 @@ def _with_limit(
     )
 
 
-def _gains(candidates: Sequence[FormCandidate]) -> dict[str, float]:
-    best = candidates[0]
-    without = {name: [c.criterion for c in candidates if name not in c.names] for name in best.names}
-    return {name: min(others) - best.criterion if others else np.inf for name, others in without.items()}
-
-
-def _rivals(candidates: Sequence[FormCandidate]) -> tuple[tuple[str, ...], ...]:
-    close = [
-        c for c in candidates if c.criterion - candidates[0].criterion < POLICY.rival_margin and c.count <= candidates[0].count
-    ]
-    return tuple(dict.fromkeys(c.names for c in close if c.names and set(c.names) != set(candidates[0].names)))
-
-
 def _estimated(best: FormCandidate, numbers: Vector, cov: Matrix) -> dict[str, tuple[float, float]]:
     return {name: (float(numbers[at]), float(np.sqrt(cov[at, at]))) for name, at in GAINS.items() if name in best.form.unknown}
 
 
 def _rms(parts: Sequence[Vector]) -> float:
     return float(np.sqrt(np.mean(np.concatenate(parts) ** 2)))
-
-
-def _fitted(law: Law, best: FormCandidate, given: PI) -> tuple[Vector, Vector, Matrix]:
-    """(P, filters' numbers, covariance of both) of a form, by least squares on the replay itself."""
-    from scipy.optimize import least_squares
-
-    form, shape = best.form, best.shape
-    fixed, moved = form.constraints(given, len(law.lengths))
-    B = form.of_columns(len(fixed), law.period)
-    m = moved.shape[1]
-    size = float(np.sqrt(np.mean(law.logged**2)))
-
-    def off(x: Vector) -> Vector:
-        return (law.columns(shape.places, x[m:]) @ (B @ (fixed + moved @ x[:m])) - law.logged) / size
-
-    start = np.concatenate([best.free[:m], shape.numbers])
-    x = start
-    if len(shape.numbers):
-        low, high = (
-            np.concatenate([np.full(m, end), b]) for end, b in zip((-np.inf, np.inf), bounds_of(shape.places), strict=True)
-        )
-        start = np.clip(start, low + INSIDE, high - INSIDE)
-        x = start
-        found = least_squares(
-            off, start, bounds=(low, high), x_scale="jac", xtol=1e-14, ftol=1e-14, gtol=1e-15, max_nfev=POLICY.final
-        )
-        x = found.x if np.sum(found.fun**2) <= np.sum(off(start) ** 2) else start
-    # A weight of exactly 0 was chosen; its deviation is that of a free weight.
-    wide = (
-        form.constraints(given, len(law.lengths))[1]
-        if form.weight != "none"
-        else np.column_stack([moved, np.eye(len(fixed))[KP_R]])
-    )
-    table = law.columns(shape.places, x[m:])
-    coefficients = B @ (fixed + moved @ x[:m])
-    slopes = _slopes(law, Shape(shape.places, x[m:], coefficients, shape.left))
-    J = np.column_stack([table @ B @ wide, slopes])
-    sizes = np.linalg.norm(J, axis=0)
-    sizes[sizes == 0.0] = 1.0
-    variance = max(float(np.mean((size * off(x)) ** 2)), (SUM_ROUNDING * float(np.abs(law.logged).max())) ** 2)
-    spread = variance * inverse_of(J.T @ J)
-    here = np.linalg.lstsq(J / sizes, law.logged - table @ coefficients, rcond=1e-12)[0] / sizes
-    for other in law.others:  # how far the numbers move with another velocity between the lines
-        columns = other.columns(shape.places, x[m:])
-        slopes = _slopes(other, Shape(shape.places, x[m:], coefficients, shape.left))
-        table = np.column_stack([columns @ B @ wide, slopes]) / sizes
-        there = np.linalg.lstsq(table, other.logged - columns @ coefficients, rcond=1e-12)[0] / sizes
-        spread += np.outer(there - here, there - here)
-    k = wide.shape[1]
-    outward = np.zeros((len(fixed) + len(shape.numbers), J.shape[1]))
-    outward[: len(fixed), :k] = wide
-    outward[len(fixed) :, k:] = np.eye(len(shape.numbers))
-    return fixed + moved @ x[:m], x[m:], outward @ spread @ outward.T

@@ -35,12 +35,12 @@ from gaident.control import core
 from gaident.control.between import Unsure, unsure_between
 from gaident.control.cascade import Cascade, cascade_of
 from gaident.control.controller import Controller
-from gaident.control.filtering import filtered
 from gaident.data.record import Record
 from gaident.data.torque_kind import COMMANDED
 from gaident.identification.logged_stretches import Log, log_of, unlimited
 from gaident.identification.logged_torque import comparable, not_followed
-from gaident.identification.noise import Autoregression, autocorrelation, autoregression_of, highest_order
+from gaident.identification.noise import Autoregression
+from gaident.identification.replay.line_steps import LineSteps
 from gaident.identification.replay.timed_record import TimedRecord, plain_of
 from gaident.models.starts import noise_std
 from gaident.policy.table import POLICY
@@ -52,8 +52,6 @@ __all__ = ["timed"]
 
 Vector = NDArray[np.float64]
 
-BESIDE = 2  # no decision: lines beside a limit: between them it may have acted too
-MEDIAN = 1.4826  # no decision: a formula: deviation of normal numbers over the median of their sizes
 WINDOW = np.arange(-3, 5)  # no decision: a formula: the lines around an interval, and it needs all of them inside of the record
 SMOOTH = 3  # no decision: numbers of a parabola, which is smooth over so few lines
 SHARE_STEP = 0.1  # no decision: the step of a difference
@@ -130,8 +128,7 @@ class _Timing:
     def of(cls, rec: Record, cascade: Cascade, unsure: Unsure) -> _Timing:
         log = log_of(rec, len(rec), cascade, whole=False)
         every, stretch = unsure.every, log.stretch
-        used = (stretch[1:] >= 0) & (stretch[1:] == stretch[:-1])
-        used = np.convolve(np.pad(used, BESIDE, constant_values=True), np.ones(2 * BESIDE + 1), "valid") > 2 * BESIDE
+        used = LineSteps.of(stretch, unsure).used
         free = replace(cascade, velocity=unlimited(cascade.velocity))
         count = min(POLICY.filter_memory, len(rec))
         still = np.zeros((count, every))
@@ -139,6 +136,15 @@ class _Timing:
         asked[0, 0] = 1.0
         pulse = core.servo_torque(rec.dt, free.ticks(rec.dt, asked, None), still.ravel(), free.core_loop(rec.dt))
         return cls(log, cascade, unsure, pulse, used)
+
+    @property
+    def steps(self) -> LineSteps:
+        return LineSteps(self.used, self.unsure)
+
+    @property
+    def rounding(self) -> float:
+        """Of a torque [N m]: no noise is less."""
+        return float(np.finfo(np.float64).eps * np.abs(self.log.torque).max())
 
     def off(self, between: Vector) -> Vector:
         """D (n - 1,) [N m] of a command at the samples (n, r) or at the lines (n,)."""
@@ -167,21 +173,21 @@ class _Timing:
         unsure = self.unsure
         usual, spread = unsure.usual, unsure.spread
         share = usual.copy()
-        noise = self.noise_of(self.off(unsure.early(share)))
+        noise = self.steps.noise_of(self.off(unsure.early(share)), self.rounding)
         for round_ in range(ROUNDS):
             if round_ == ROUNDS - 1:
                 share = self.on_lines_where_closer(share, noise)
             off = self.off(unsure.early(share))
-            noise = self.noise_of(off)
-            white = self.whitened(off[None, :], noise)[0]
-            columns = self.columns(share, noise)
+            noise = self.steps.noise_of(off, self.rounding)
+            white = self.steps.whitened(off[None, :], noise)[0]
+            columns = self.steps.columns(share, self.pulse, noise)
             normal = (columns.T @ columns).tocsc()
             told = normal.diagonal() * POLICY.told_time**2 >= (unsure.every - 1) ** 2
             seen = self.seen(share, ~told)
             normal = (normal + diags_array(seen.weight)).tocsc()
             share = np.clip(share + self.step(normal, columns.T @ white + seen.right, usual - share), 0.0, 1.0)
         left, lines = (
-            float(np.sum(self.whitened(self.off(command)[None, :], noise) ** 2))
+            float(np.sum(self.steps.whitened(self.off(command)[None, :], noise) ** 2))
             for command in (unsure.early(share), self.log.source)
         )
         prior = float(np.sum(((share - usual) / spread) ** 2))
@@ -191,7 +197,7 @@ class _Timing:
     def on_lines_where_closer(self, share: Vector, noise: Autoregression) -> Vector:
         """Shares (m,), of each jump 0 where that leaves less around it: a limit between the lines makes other minima."""
         none = np.where(self.unsure.jump, 0.0, share)
-        size = [np.cumsum(self.whitened(self.off(self.unsure.early(s))[None, :], noise)[0] ** 2) for s in (share, none)]
+        size = [np.cumsum(self.steps.whitened(self.off(self.unsure.early(s))[None, :], noise)[0] ** 2) for s in (share, none)]
         end = np.minimum(self.unsure.at + len(WINDOW), len(self.used) - 1)
         early, on_line = (x[end] - x[np.maximum(self.unsure.at - 1, 0)] for x in size)
         return np.where(on_line < early, none, share)
@@ -252,42 +258,3 @@ class _Timing:
         scaled = diags_array(self.unsure.spread)
         lower = splu((eye_array(normal.shape[0]) + scaled @ normal @ scaled).tocsc())
         return float(np.sum(np.log(np.abs(lower.U.diagonal()))))
-
-    def noise_of(self, off: Vector) -> Autoregression:
-        """Of D where it is used, without what the shares are still off by: as the quiet lines show its size."""
-        used = off[self.used]
-        rounding = np.finfo(np.float64).eps * float(np.abs(self.log.torque).max())
-        quiet = max(MEDIAN * float(np.median(np.abs(used))), rounding)
-        most = POLICY.above_noise * quiet
-        noise = autoregression_of(autocorrelation(np.clip(off, -most, most), highest_order([len(used)])), len(used))
-        return Autoregression(noise.phi, max(noise.std, rounding))
-
-    def whitened(self, rows: Vector, noise: Autoregression) -> Vector:
-        """Rows of D (k, n - 1) over their noise; 0 where a limit lies within the filter."""
-        rows = filtered(np.append(1.0, -noise.phi), np.ones(1), rows, [rows.shape[1]]) / noise.std
-        return np.where(self.reached(noise.order), rows, 0.0)
-
-    def reached(self, order: int) -> NDArray[np.bool_]:
-        """Differences before which `order` others are used (n - 1,)."""
-        counts = np.cumsum(np.append(0, self.used))
-        first = np.maximum(np.arange(len(self.used)) - order, 0)
-        return np.asarray(counts[1:] - counts[first] == np.minimum(np.arange(len(self.used)), order) + 1)
-
-    def columns(self, share: Vector, noise: Autoregression) -> csc_array:
-        """What D whitened changes with each share (n - 1, m)."""
-        from scipy.sparse import csc_array
-
-        every, unsure = self.unsure.every, self.unsure
-        middle, n = unsure.middle(share), len(self.used)
-        lines = len(self.pulse) // every
-        # The torque at the lines behind a pulse at sample p of an interval, from its own line on.
-        answers = np.array([np.append(0.0, self.pulse[every - p :: every])[:lines] for p in range(every)])
-        shapes = filtered(np.append(1.0, -noise.phi), np.ones(1), np.diff(answers, axis=1), [lines - 1])
-        size = np.abs(shapes).max(axis=0)
-        lasts = int(np.flatnonzero(size > POLICY.negligible * size.max(initial=0.0)).max(initial=0)) + 1
-        rows = unsure.at[:, None] + np.arange(lasts)
-        values = shapes[middle, :lasts] * (unsure.rise * (every - 1) / noise.std)[:, None]
-        inside = rows < n
-        inside &= np.append(self.reached(noise.order), False)[np.minimum(rows, n)]
-        of = np.broadcast_to(np.arange(len(unsure.at))[:, None], rows.shape)
-        return csc_array((values[inside], (rows[inside], of[inside])), shape=(n, len(unsure.at)))
