@@ -15,10 +15,13 @@ from gaident.diagnosis.controller.form_findings import loop_of
 from gaident.diagnosis.controller.forms import form_shown
 from gaident.identification.replay.command_timing import timed
 from gaident.identification.replay.timed_record import TimedRecord
-from jump_logs import KI, KP, T, levels, record
+from loop_cases import PERIOD as T
+from loop_cases import jump_levels as levels
+from loop_cases import jump_log as record
 
 skip_without_library()
 
+KP, KI = 0.1, 6.0
 GIVEN = ga.PI(KP, KI)
 NOTCH = ga.Notch(frequency=120.0, numerator_damping=0.1, denominator_damping=0.7)
 LOOPS: dict[str, tuple[ga.Cascade, dict[str, dict[str, float]]]] = {

@@ -11,7 +11,19 @@ import gaident as ga
 from drive_cases import EFFECTS, LATER, RAMPS, command_for, level_command, random_plant, stable
 from drive_rig import Array, Noise, Plant, RanAwayError, between_lines, run_drive
 
-__all__ = ["EVERY", "LOOPS", "industrial_plant", "loop_effects", "loop_kind", "loop_noise", "loop_plant", "ramp_kind"]
+__all__ = [
+    "EVERY",
+    "LOOPS",
+    "PERIOD",
+    "industrial_plant",
+    "jump_levels",
+    "jump_log",
+    "loop_effects",
+    "loop_kind",
+    "loop_noise",
+    "loop_plant",
+    "ramp_kind",
+]
 
 PERIOD = 125e-6  # s, of the velocity controller
 EVERY = (1, 2, 4, 8)  # its samples to a line of the log
@@ -191,3 +203,20 @@ def industrial_plant(loop: str, every: int, rng: np.random.Generator) -> Plant:
         except RanAwayError:
             continue
     raise RuntimeError(f"no stable drive found in the loop {loop!r}")
+
+
+def jump_levels(every: int, seed: int, on_lines: bool = False) -> Array:
+    """Levels [rad/s] that begin at any of a controller's samples, at least 60 lines each; (1000 every,)."""
+    rng, whole, at = np.random.default_rng(seed), np.zeros(1000 * every), 100
+    while at < 1000:
+        whole[at * every + (0 if on_lines else int(rng.integers(every))) :] = rng.uniform(-40.0, 40.0)
+        at += int(rng.integers(60, 150))
+    return whole
+
+
+def jump_log(whole: Array, every: int, loop: ga.Cascade, **effects: dict[str, float]) -> ga.Record:
+    """The log of two masses under this command at the controller's samples [rad/s], every so-many-th of them."""
+    axis = Plant(J=4e-4, D=1e-3, JL=4e-4, DL=1e-3, KG=60.0, DG=5e-3, kp=0.1, ki=6.0, dt=every * PERIOD, cascade=loop)
+    log = run_drive(axis, whole, effects, encoder=2 * np.pi / 2**20, differenced=True)
+    lines = {"velocity": log.velocity, "torque": log.torque, "command": whole}
+    return ga.Record(every * PERIOD, **{name: x[::every] for name, x in lines.items()})

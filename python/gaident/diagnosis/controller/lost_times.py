@@ -81,7 +81,7 @@ class LostTimes:
     @property
     def cost(self) -> float:
         """ln det(1 + C S^2 C')."""
-        return float(2.0 * np.sum(np.log(self.factor[0])))
+        return float(2.0 * np.sum(np.log(self.factor[0])))  # no decision: a formula
 
     def _solved(self, rows: Matrix, trans: str = "N") -> Matrix:
         """L^-1 rows, or with "T" the inverse of its transpose."""

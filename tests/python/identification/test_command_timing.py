@@ -12,7 +12,9 @@ from drive_rig import skip_without_library
 from gaident.control.between import between_lines, unsure_between
 from gaident.identification.replay.command_timing import timed
 from gaident.identification.replay.timed_record import TimedRecord
-from jump_logs import T, levels, record
+from loop_cases import PERIOD as T
+from loop_cases import jump_levels as levels
+from loop_cases import jump_log as record
 
 LOOP = ga.Cascade(ga.PI(0.1, 6.0), T)
 FILTERED = ga.Cascade(ga.PI(0.1, 6.0, rule="backward"), T, torque_filters=(ga.LowPass(0.3e-3),))
