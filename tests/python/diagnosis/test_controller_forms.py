@@ -204,6 +204,14 @@ def test_another_anti_windup_than_the_given_one_is_found_at_a_given_limit(windup
     assert said in notes and "torque saturation" not in notes
 
 
+@pytest.mark.parametrize(("every", "exact"), [(1, 1e-6), (4, 5e-3)])
+def test_a_tracking_time_that_was_not_given_is_found(every: int, exact: float) -> None:
+    time = 4.2e-3
+    rec = slower(every, torque_limit=0.6, windup="tracking", tracking=time)
+    found = limited([rec], ga.Cascade(GIVEN, T)).controller.velocity
+    assert found.anti_windup == "tracking" and found.tracking_time == pytest.approx(time, rel=exact)
+
+
 def test_a_slower_log_whose_torque_no_form_makes_names_none() -> None:
     rec = slower()
     assert rec.torque is not None

@@ -234,7 +234,9 @@ def notes_of(shown: Shown, records: Sequence[Record]) -> tuple[Text, ...]:
     scheme = shown.controller.velocity.anti_windup
     if (OF_SETTING["torque_limit"] in shown.numbers or not shown.numbers) and scheme != "none":
         does = {"hold": "is held", "tracking": "is set back"}[scheme]
-        notes.append(Text(f"At its limit the integrator {does} (anti-windup {scheme!r}): so the controller comes closest."))
+        time = shown.controller.velocity.tracking_time
+        how = repr(scheme) if time is None else f"{scheme!r}, {1e3 * time:.4g} ms"
+        notes.append(Text(f"At its limit the integrator {does} (anti-windup {how}): so the controller comes closest."))
     if shown.rivals:
         others = "; ".join(" and ".join(name.replace("_", " ") for name in names) for names in shown.rivals)
         notes.append(Text(f"The log does not tell this from a controller with, instead: {others}."))

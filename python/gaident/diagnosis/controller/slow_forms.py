@@ -28,7 +28,9 @@ __all__ = ["Limited", "limited", "run_error", "too_fast"]
 Vector = NDArray[np.float64]
 
 SUM_ROUNDING = 1e-9  # no decision: of a torque, what a sum is exact to
+TIME_EXACT = 1e-10  # no decision: of a search, of the logarithm of a time
 TIMES = np.geomspace(0.3e-3, 0.3, POLICY.tracking_times)  # no decision: a start; s
+NEXT_TIME = float(TIMES[1] / TIMES[0])
 
 
 @dataclass(frozen=True)
@@ -99,8 +101,26 @@ def limited(records: Sequence[Record], controller: Cascade) -> Limited:
 
 
 def _closest(records: Sequence[Record], controller: Cascade, limit: float) -> Cascade:
-    """The controller with the anti-windup at a limit with which its torque comes closest to the logged one."""
-    return min((run_error(records, one), k, one) for k, one in enumerate(_schemes(controller, limit)))[2]
+    """The controller with the anti-windup at a limit with which its torque comes closest to the logged one.
+
+    A tracking time is searched between the neighbours of the best one of a grid.
+    """
+    from scipy.optimize import minimize_scalar
+
+    best = min((run_error(records, one), k, one) for k, one in enumerate(_schemes(controller, limit)))[2]
+    if (time := best.velocity.tracking_time) is None:
+        return best
+
+    def with_time(logarithm: float) -> Cascade:
+        return replace(best, velocity=replace(best.velocity, tracking_time=float(np.exp(logarithm))))
+
+    found = minimize_scalar(
+        lambda x: run_error(records, with_time(x)),
+        bounds=(np.log(time / NEXT_TIME), np.log(time * NEXT_TIME)),
+        method="bounded",
+        options={"xatol": TIME_EXACT},
+    )
+    return min((best, with_time(found.x)), key=lambda one: run_error(records, one))
 
 
 def _spread(records: Sequence[Record], limit: float) -> float:
