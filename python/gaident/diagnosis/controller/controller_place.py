@@ -147,7 +147,9 @@ def controller_findings(data: DataSet, scales: Scales) -> tuple[list[Finding], A
         return _limit_findings(data, shown, off, plain, floor, notes)
     steps = (float(np.abs(np.diff(controller.asked(r), prepend=0.0)).max()) / r.dt for r in data.read)
     scales = replace(scales, acceleration=max(steps) or float("inf"))
-    best = min(((*_fitted(data, scales, term), term) for term in in_controller()), key=lambda found: found[1])
+    # A command that never changes has no slope, and shows no limit of one.
+    terms = [term for term in in_controller() if np.isfinite(term.limits(scales)).all()]
+    best = min(((*_fitted(data, scales, term), term) for term in terms), key=lambda found: found[1])
     value, cost, term = best
     effect = term.name
     n, before = len(plain), float(plain @ plain)

@@ -87,8 +87,8 @@ def dependence(objective: Objective, fit: Fit) -> Dependence:
     for pairs in lines:
         # A frequency that was searched for counts as a number more.
         gain = none - account.bic(pairs) - cost_of(1, objective.information)
-        if gain > gains["time"]:
-            gains["time"], line = gain, _torque_of_line(objective, fit, J, error, pairs)
+        if gain > gains["time"] and (found := _torque_of_line(objective, fit, J, error, pairs)) is not None:
+            gains["time"], line = gain, found
     beside = {driver: np.vstack([J, rows]) for driver, rows in columns.items()}
     least = {driver: objective.raw_rest(rows, error) for driver, rows in beside.items()}
     unwhitened = {driver: objective.unwhitened_rest(rows, error) for driver, rows in beside.items()}
@@ -208,7 +208,7 @@ def _of_position(angle: Vector, w: Vector) -> Matrix:
     shapes = [f(k * angle) for k in (1.0, 2.0) for f in (np.sin, np.cos) if k * turned > 1.0]
     shapes += list(_hats(angle, POLICY.angle_knots)[1:])
     rows = [s * d for s in shapes for d in (np.ones_like(w), direction)]
-    return np.array(rows)
+    return np.array(rows).reshape(-1, len(w))
 
 
 def _of_path(angle: Vector, lengths: tuple[int, ...]) -> Matrix:
@@ -269,13 +269,16 @@ def _peak(spectrum: Vector, k: int) -> float:
     return float(k + (0.5 * (a - c) / curve if curve < 0.0 else 0.0))
 
 
-def _torque_of_line(objective: Objective, fit: Fit, jacobian: Matrix, error: Vector, pairs: Matrix) -> tuple[float, float]:
+def _torque_of_line(objective: Objective, fit: Fit, jacobian: Matrix, error: Vector, pairs: Matrix) -> tuple[float, float] | None:
     """(frequency [Hz], amplitude [N m]) of a torque a cos(wt) + b sin(wt), fitted to the error beside the model's parameters.
 
     jacobian (parameters, N) and error (N,) raw; pairs: rows cos(wt), sin(wt) of each record, 0 outside it, t from its start.
     Of several records the amplitude is the rms of theirs, each by its samples.
+    None: in a loop that grows beyond all numbers no torque has a finite response.
     """
     answers = fit.predictor.torque_response(fit.parameters, fit.x, pairs)
+    if not np.isfinite(answers).all():
+        return None
     rows = objective.whitened(np.vstack([jacobian, answers]), WHITE)
     sizes = np.sqrt(np.einsum("ij,ij->i", rows, rows))
     sizes[sizes == 0.0] = 1.0
