@@ -31,7 +31,8 @@ class TimeAxis:
     def __init__(self, column: Column, second: float, given: float | None = None, strict: bool = True) -> None:
         """second: what one of the column's units is in s; given: the dt [s] that must agree, None if there is none.
 
-        strict: whether an irregular axis is refused, as it is where the column was named as the time.
+        strict: whether an irregular axis is refused, as it is where the column was named as the time; otherwise only lost and
+        doubled rows and a time that goes back are.
         """
         self.column, self.second, self.given, self.strict = column, second, given, strict
         self.count, self.start, self.last, self.step, self.rounding = 0, 0.0, 0.0, 0.0, 0.0
@@ -52,6 +53,8 @@ class TimeAxis:
             _check_given(table, self.column, float(np.median(np.diff(whole))) * self.second, self.second, self.given)
         if self.strict:
             self._check(table, whole, shift)
+        else:
+            self._check_rows(table, whole, shift)
 
     def sample_time(self, table: LogTable) -> float:
         """dt [s]: (t(n-1) - t(0)) / (n - 1)."""
@@ -61,18 +64,34 @@ class TimeAxis:
         mean = (self.last - self.start) / (self.count - 1) * self.second
         return float(f"{mean:.12g}")
 
+    def _check_rows(self, table: LogTable, t: NDArray[np.float64], shift: int) -> None:
+        """Each step is one sample, whatever the clock's jitter: raises ReadError for rows that are lost or there twice."""
+        assert self.given is not None
+        steps = np.diff(t)
+        if (steps < 0.0).any():
+            self._refuse_back(table, t, int(np.argmax(steps < 0.0)) + 1, shift)
+        even = t[0] + np.arange(t.size) * self.given / self.second
+        if np.all(np.abs(t - even) <= _printed_step(t)):
+            return
+        usual = float(np.median(steps))
+        lost = np.abs(steps - usual) > 0.5 * usual  # no decision: rounding: to whole samples
+        if usual > 0.0 and lost.any() and not even_step(steps)[1]:
+            _refuse(table, self.column, t, int(np.argmax(lost)), self.second, shift)
+
+    def _refuse_back(self, table: LogTable, t: NDArray[np.float64], row: int, shift: int) -> None:
+        raise ReadError.at(
+            f"{table.path}, {table.place(row - shift)}",
+            f"time column {self.column.key!r} does not increase ({t[row - 1]:.12g}, then {t[row]:.12g})",
+            f"sort the log, or give {arg('dt')} and set {NO_TIME}",
+        )
+
     def _check(self, table: LogTable, t: NDArray[np.float64], shift: int) -> None:
         steps = np.diff(t)
         median = float(np.median(steps))
         if median <= 0.0:
             if steps.min() == 0.0 and steps.max() > 0.0:
                 _too_coarse(table, self.column, float(steps[steps > 0.0].min()))
-            row = int(np.argmin(steps > 0.0)) + 1
-            raise ReadError.at(
-                f"{table.path}, {table.place(row - shift)}",
-                f"time column {self.column.key!r} does not increase ({t[row - 1]:.12g}, then {t[row]:.12g})",
-                f"sort the log, or give {arg('dt')} and set {NO_TIME}",
-            )
+            self._refuse_back(table, t, int(np.argmin(steps > 0.0)) + 1, shift)
         usual = self.step or median  # of the first block
         deviation = np.abs(steps - usual)
         unequal = deviation > POLICY.clock_jitter * usual

@@ -14,6 +14,7 @@ from gaident.arguments import arg
 from gaident.data.formats.cells import ROWS, numbers_of
 from gaident.data.formats.dialect import Dialect, detect
 from gaident.data.formats.exports import END_MARK, refined, scope_layout
+from gaident.data.formats.faults import Thousands, refuse_cut_line
 from gaident.data.formats.header import COMMENT, Header, find_header
 from gaident.data.formats.table import Column, LogTable, first_line
 from gaident.data.formats.text import Line, check_text, encoding_of, lines_of
@@ -97,6 +98,9 @@ def open_text(path: str, file: Path, options: TextOptions) -> LogTable:
         everything = lines_of(path, file.read_bytes(), options.encoding)
         layout, lines = _layout(path, everything, options)
         numbers, body = zip(*lines, strict=True)
+        Thousands(path, layout.dialect, options.decimal is not None).push(numbers, body)
+        if everything[-1]:
+            refuse_cut_line(path, numbers, body, layout.dialect)
         return layout.table(path, numbers, body)
     with open(file, "rb") as stream:
         head = stream.read(_HEAD)
@@ -107,7 +111,11 @@ def open_text(path: str, file: Path, options: TextOptions) -> LogTable:
 
     def batches(columns: Sequence[Column]) -> Iterator[LogTable]:
         keys = {column.key for column in columns}
-        for numbers, body in _blocks(path, file, encoding, layout.start):
+        thousands = Thousands(path, layout.dialect, options.decimal is not None)
+        for numbers, body, ended in _blocks(path, file, encoding, layout.start):
+            thousands.push(numbers, body)
+            if not ended:
+                refuse_cut_line(path, numbers, body, layout.dialect)
             block = layout.table(path, numbers, body)
             yield replace(block, columns=tuple(column for column in block.columns if column.key in keys))
 
@@ -156,20 +164,22 @@ def _filled(lines: Iterable[Line]) -> Iterator[Line]:
     return ((number, text) for number, text in lines if text and not text.isspace() and text != END_MARK)
 
 
-def _blocks(path: str, file: Path, encoding: str, start: int) -> Iterator[tuple[list[int], list[str]]]:
-    """(line numbers, lines) of the rows of numbers, some thousand at a time."""
+def _blocks(path: str, file: Path, encoding: str, start: int) -> Iterator[tuple[list[int], list[str], bool]]:
+    """(line numbers, lines, whether the last one has a line end) of the rows of numbers, some thousand at a time."""
     with open(file, encoding=encoding, newline=None) as stream:
         numbers: list[int] = []
         body: list[str] = []
+        ended = True
         try:
-            for number, text in _filled((n, line.rstrip("\n")) for n, line in enumerate(stream, 1)):
-                if number < start or COMMENT.match(text):
+            for number, line in _filled(enumerate(stream, 1)):
+                text, ended = line.rstrip("\n"), line.endswith("\n")
+                if number < start or text == END_MARK or COMMENT.match(text):
                     continue
                 numbers.append(number)
                 body.append(text)
                 if len(body) == ROWS:
                     check_text(path, body, numbers[0])
-                    yield numbers, body
+                    yield numbers, body, ended
                     numbers, body = [], []
         except UnicodeError as error:
             raise ReadError(
@@ -178,4 +188,4 @@ def _blocks(path: str, file: Path, encoding: str, start: int) -> Iterator[tuple[
             ) from None
         if body:
             check_text(path, body, numbers[0])
-            yield numbers, body
+            yield numbers, body, ended

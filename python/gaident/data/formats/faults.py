@@ -1,0 +1,87 @@
+"""What a text table shows of faults in how it was written: marks between thousands, a last line that is cut within a number."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+
+from gaident.arguments import arg
+from gaident.data.formats.dialect import Dialect, parse_number, split
+from gaident.errors import ReadError
+
+__all__ = ["Thousands", "refuse_cut_line"]
+
+_SHORT = re.compile(r"[+-]?\d{1,3}")
+_GROUPS = {mark: re.compile(rf"[+-]?[1-9]\d{{0,2}}(?:{re.escape(mark)}\d{{3}})+") for mark in ".,"}
+
+
+class Thousands:
+    """Looks for whole numbers whose thousands are marked, `1,000` or `1.000`, which would be read as 1.
+
+    Where one cell of the table can only have decimals (0.5, 12.25, 1e-3), so have the others: the mark is that of decimals.
+    Where none does, and a column has numbers of three digits at most beside such with a mark before three digits (900, 1,000),
+    the mark separates thousands, or nobody knows. In quotation marks between commas nobody knows either.
+    """
+
+    def __init__(self, path: str, dialect: Dialect, known: bool) -> None:
+        """known: whether the user says what the decimal mark is."""
+        self.path, self.dialect, self.known = path, dialect, known
+        self.marked: dict[int, tuple[int, str]] = {}
+        self.short: set[int] = set()
+        self.long: set[int] = set()
+
+    def push(self, numbers: Sequence[int], body: Sequence[str]) -> None:
+        """The next lines, numbers: theirs in the file. Raises ReadError where a mark has two meanings."""
+        mark = self.dialect.decimal
+        if not self.known and (self.marked or mark == self.dialect.delimiter or any(mark in text for text in body)):
+            self._look(numbers, body)
+        elif not self.known:
+            self._look(numbers[:1], body[:1])
+        if self.known:
+            return
+        for k, (number, cell) in self.marked.items():
+            if k not in self.long and (k in self.short or self.dialect.delimiter == mark):
+                raise ReadError.at(
+                    f"{self.path}, line {number}",
+                    f"{cell!r} may be a number with decimals or one with a mark between its thousands",
+                    f"export the log without marks between thousands; if these are decimals, give {arg('decimal', repr(mark))}",
+                )
+
+    def _look(self, numbers: Sequence[int], body: Sequence[str]) -> None:
+        mark, groups = self.dialect.decimal, _GROUPS[self.dialect.decimal]
+        wanted = [k for k, numeric in enumerate(self.dialect.numeric) if numeric]
+        for number, text in zip(numbers, body, strict=True):
+            cells = split(text, self.dialect.delimiter)
+            for k in wanted:
+                cell = cells[k] if k < len(cells) else ""
+                if mark not in cell:
+                    (self.short if _SHORT.fullmatch(cell) else self.long).add(k) if cell else None
+                elif groups.fullmatch(cell):
+                    self.marked.setdefault(k, (number, cell))
+                elif parse_number(cell, mark) is not None:
+                    self.known = True
+                    return
+
+
+def refuse_cut_line(path: str, numbers: Sequence[int], body: Sequence[str], dialect: Dialect) -> None:
+    """Raises ReadError where the last of these lines, which has no line end, is cut within its last number.
+
+    That shows where the column is printed with one number of characters behind the decimal mark, and fewer stand there.
+    Of whole numbers, and of numbers printed with as many digits as they need, it does not show.
+    """
+    last = _tail(body[-1], dialect)
+    others = {_tail(text, dialect) for text in body[:-1]} if last is not None else set()
+    if last is not None and len(others) == 1 and last < (others.pop() or 0):
+        raise ReadError.at(
+            f"{path}, line {numbers[-1]}",
+            "the file ends within a number, for its last line has no line end and fewer decimals than the others",
+            "copy the log again, or remove its last line",
+        )
+
+
+def _tail(text: str, dialect: Dialect) -> int | None:
+    """Characters of a line's last cell behind the decimal mark; None where it is no number, or cells are missing."""
+    cells = split(text, dialect.delimiter)
+    if len(cells) != dialect.width or parse_number(cells[-1], dialect.decimal) is None:
+        return None
+    return len(cells[-1].partition(dialect.decimal)[2])
