@@ -81,7 +81,8 @@ class Case:
     @property
     def key(self) -> str:
         """Its name in the file; what is as always is left out."""
-        more = [*([self.drives] if self.drives != DRIVES[0] else []), *(["jumps"] if self.jumps else []), *([] if self.torque else ["no torque"])]
+        more = [*([self.drives] if self.drives != DRIVES[0] else []), *(["jumps"] if self.jumps else [])]
+        more += [] if self.torque else ["no torque"]
         more += [f"{self.bits[0]} to {self.bits[1] - 1} bits"] if self.bits != INDUSTRY_BITS else []
         return "/".join([self.loop, str(self.every), self.effect, str(self.number), self.given, *more])
 

@@ -106,9 +106,7 @@ def test_a_dt_overrules_jitter_and_coarse_stamps(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("whole", [True, False], ids=["in memory", "in blocks"])
 @pytest.mark.parametrize("form", ["{:.4f}", "{:.5e}"])
-def test_a_last_line_that_is_cut_within_a_number(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, form: str, whole: bool
-) -> None:
+def test_a_last_line_that_is_cut_within_a_number(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, form: str, whole: bool) -> None:
     if not whole:
         monkeypatch.setattr(delimited, "WHOLE", 100)
     rows = [f"{t:.3f},{form.format(np.sin(t))},{form.format(np.cos(t))}" for t in EVEN]
@@ -117,7 +115,7 @@ def test_a_last_line_that_is_cut_within_a_number(
     text = log.read_text()
     for cut in range(1, 4):
         log.write_text(text[:-cut])
-        with pytest.raises(ga.GaidentError, match="line 61.*(the file ends within a number|not a number)"):
+        with pytest.raises(ga.GaidentError, match=r"line 61.*(the file ends within a number|not a number)"):
             ga.read(log)
     log.write_text(text + "\n")
     assert ga.read(log).velocity[-1] == float(form.format(np.cos(EVEN[-1])))
