@@ -103,7 +103,7 @@ def _form_of(
             if told is not None:
                 return _with_limit(told.records, given, told.candidates, told.fitted)
         negligible = POLICY.negligible * float(np.abs(law.torque).max())
-        return _shown_slowly(records, given, candidates, following or _following(candidates, given, floor, negligible))
+        return _shown_slowly(records, given, candidates, _following(candidates, given, floor, negligible))
     shown = _shown(records, law, given, candidates) if candidates[0].names else None
     return shown or _shown_quietly(records, law, given, floor, unknown)
 
