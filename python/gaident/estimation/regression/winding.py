@@ -23,7 +23,6 @@ __all__ = ["WindingFit", "estimate_winding"]
 
 Vector = NDArray[np.float64]
 
-PASSES = 3  # no decision: of a solver
 NAMES = {"resistance": "Ohm", "back_emf_constant": "V s/rad", "inductance": "H", "offset": "V"}
 
 
@@ -63,16 +62,10 @@ def estimate_winding(
 ) -> WindingFit:
     """Estimate a winding's resistance and back-EMF constant from voltage, current and velocity.
 
-        U(n) = R (i(n) + i(n+1))/2 + ke ((1 - h) w(n) + h w(n+1)) + c (i(n+1) - i(n)) + U0
+        U_h(n) = R i(n) + ke w(n) + L (i(n+1) - i(n-1))/(2 dt) + U0,   U_h(n) = (U(n) + U(n-1))/2
 
     by least squares, all signals behind the same zero-phase filter and decimated.
-    Under a voltage that is held over each sample the current goes with the time constant L/R to where it would settle, so that
-
-        i(n+1) = a i(n) + (1 - a) (U(n) - U0 - ke w)/R,   a = exp(-R dt/L)
-        c = R/2 (1 + a)/(1 - a),   L = R dt/ln((2c + R)/(2c - R)),   h = 1/(1 - a) - L/(R dt)
-
-    h weighs a velocity that goes straight from sample to sample; it is 1/2 in a first pass, and that of the L found in two more.
-    With 2c <= R the current follows within the sample, and no inductance is determined.
+    U_h is what a voltage that is held over each sample shows in a central difference.
     The deviations know that neighbouring errors are alike (Newey and West 1987).
 
     Parameters
@@ -117,20 +110,15 @@ def estimate_winding(
     if not 0.0 < cutoff < 0.5 / rec.dt:  # no decision: a formula: the Nyquist frequency
         raise RecordError(f"cutoff_hz={cutoff_hz!r}: give a corner between 0 and {0.5 / rec.dt:g} Hz, or None")
     factor = decimation_of(None, cutoff, rec.dt)
-    U, i, w = (low_passed(x, rec.dt, cutoff, ORDER) for x in (U, i, w))
-    U, later = U[:-1], 0.5
-    for _ in range(PASSES):
-        columns = (0.5 * (i[1:] + i[:-1]), (1.0 - later) * w[:-1] + later * w[1:], np.diff(i), np.ones(len(U)))
-        X, y = (np.column_stack([decimated(np.ascontiguousarray(c), factor) for c in part])[2:-2] for part in (columns, (U,)))
-        if len(X) < POLICY.least_rows:
-            raise RecordError(f"only {len(X)} rows are left of {len(w)} samples behind {cutoff:g} Hz; give a longer record")
-        theta, _ = solve(X, y[:, 0])
-        left = y[:, 0] - X @ theta
-        theta[2], to = _inductance(float(theta[0]), float(theta[2]), rec.dt)
-        samples = theta[2] / (theta[0] * rec.dt)  # of the time constant L/R
-        later = float(1.0 / -np.expm1(-1.0 / samples) - samples) if samples > 0.0 else 1.0
-    cov = to @ covariance([X], [left]) @ to.T
-    std = np.sqrt(np.diag(cov))
+    held = 0.5 * (U + np.concatenate([U[:1], U[:-1]]))
+    U, i, w = (low_passed(x, rec.dt, cutoff, ORDER) for x in (held, i, w))
+    columns = (i, w, np.gradient(i, rec.dt), np.ones(len(i)))
+    X, y = (np.column_stack([decimated(np.ascontiguousarray(c), factor) for c in part])[2:-2] for part in (columns, (U,)))
+    if len(X) < POLICY.least_rows:
+        raise RecordError(f"only {len(X)} rows are left of {len(w)} samples behind {cutoff:g} Hz; give a longer record")
+    theta, _ = solve(X, y[:, 0])
+    left = y[:, 0] - X @ theta
+    std = np.sqrt(np.diag(covariance([X], [left])))
     found = {
         name: Estimate(float(x), float(s), unit, identifiable=bool(s < abs(x)))
         for (name, unit), x, s in zip(NAMES.items(), theta, std, strict=True)
@@ -150,15 +138,3 @@ def estimate_winding(
         inductance.value if inductance.value > POLICY.winding_sure * inductance.std else 0.0,
     )
     return WindingFit(winding, found, float(np.sqrt(left @ left / (y[:, 0] @ y[:, 0]))), cutoff)
-
-
-def _inductance(R: float, c: float, dt: float) -> tuple[float, Vector]:
-    """(L, its gradient and that of the others by what was regressed); with 2c <= R L is 0, and its deviation that of c dt."""
-    to = np.eye(len(NAMES))
-    if not 2.0 * c > R > 0.0:  # no decision: a formula: the logarithm has no value there
-        to[2, 2] = dt
-        return 0.0, to
-    slow, steep = np.log((2.0 * c + R) / (2.0 * c - R)), 4.0 / (4.0 * c**2 - R**2)  # R dt/L
-    L = R * dt / slow
-    to[2, 0], to[2, 2] = L / R - L / slow * c * steep, L / slow * R * steep
-    return float(L), to
