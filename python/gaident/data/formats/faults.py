@@ -54,8 +54,10 @@ class Thousands:
             cells = split(text, self.dialect.delimiter)
             for k in wanted:
                 cell = cells[k] if k < len(cells) else ""
+                if not cell:
+                    continue
                 if mark not in cell:
-                    (self.short if _SHORT.fullmatch(cell) else self.long).add(k) if cell else None
+                    (self.short if _SHORT.fullmatch(cell) else self.long).add(k)
                 elif groups.fullmatch(cell):
                     self.marked.setdefault(k, (number, cell))
                 elif parse_number(cell, mark) is not None:

@@ -22,7 +22,7 @@ from gaident.identification.replay.line_steps import LineSteps
 from gaident.identification.replay.timed_record import TimedRecord
 from gaident.policy.table import POLICY
 
-__all__ = ["about", "cost_of_shape", "jumps_of", "on_samples", "shape_between"]
+__all__ = ["about", "cost_of_left", "jumps_of", "on_samples", "shape_between"]
 
 Vector = NDArray[np.float64]
 
@@ -54,16 +54,16 @@ def shape_between(law: Law, unsure: Unsure, places: tuple[Place, ...], given: PI
     for start in grid_of(places):
         one = _losing(law, unsure, Shape(places, start, gains, np.zeros(0)), unsure.usual)
         shape = solved_shape(one, places, start)
-        tried.append((cost_of_shape(one, shape), len(tried), one, shape))
+        tried.append((cost_of_left(one, shape.left), len(tried), one, shape))
     found = [_followed(one, shape) for _, _, one, shape in sorted(tried, key=lambda x: x[:2])[:FOLLOWED]]
-    return min(found, key=lambda x: cost_of_shape(*x))
+    return min(found, key=lambda x: cost_of_left(x[0], x[1].left))
 
 
-def cost_of_shape(law: Law, shape: Shape) -> float:
-    """Twice the negative logarithm of the likelihood, a line, but for a constant."""
+def cost_of_left(law: Law, left: Vector) -> float:
+    """Twice the negative logarithm of the likelihood of what is left of the torque (n,) [N m], a step, but for a constant."""
     assert law.lost is not None
     least = np.finfo(np.float64).tiny
-    return float(np.log(max(shape.rms**2, least))) + law.lost.cost / len(shape.left)
+    return float(np.log(max(np.mean(left**2), least))) + law.lost.cost / len(left)
 
 
 def _followed(law: Law, shape: Shape) -> tuple[Law, Shape]:

@@ -3,7 +3,7 @@
 Where a slow log does not tell when its command jumped, each set of filters has a noise of its own (`lost_times`).
 The criterion is then
 
-    N (ln(rss/n) + ln det(L L')/n)   instead of   n ln(max(rss/n, floor^2))        N: lines of the log, n: steps that count
+    N (ln(rss/n) + ln(det(L L'))/n)   instead of   n ln(max(rss/n, floor^2))        N: lines of the log, n: steps that count
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from gaident.control.between import Unsure
 from gaident.control.pi import PI, RULES
 from gaident.diagnosis.controller.form import FEEDS, FIRST_FEED, KI, KP_R, KP_W, WEIGHTS, Form, FormCandidate
-from gaident.diagnosis.controller.form_between import about, cost_of_shape, on_samples, shape_between
+from gaident.diagnosis.controller.form_between import about, cost_of_left, on_samples, shape_between
 from gaident.diagnosis.controller.form_regression import (
     FILTER_SETS,
     FILTER_SETS_OF_ONE,
@@ -35,7 +35,7 @@ from gaident.estimation.projection import inverse_of
 from gaident.identification.replay.causes import white_noise
 from gaident.policy.table import POLICY
 
-__all__ = ["Fitted", "compared", "fitted_form", "fitted_with_times", "gains_of", "rivals_of"]
+__all__ = ["Fitted", "compared", "fitted_form", "fitted_with_times", "gains_of", "rivals_of", "shape_of"]
 
 Vector = NDArray[np.float64]
 Matrix = NDArray[np.float64]
@@ -101,7 +101,7 @@ def _candidates(law: Law, shape: Shape, given: PI, floor: float, unknown: tuple[
         if law.lost is None:
             cost = bic(max(left / n, floor**2), n, 0)
         else:
-            cost = len(law.torque) * cost_of_shape(law, replace(shape, left=np.full(n, np.sqrt(left / n))))
+            cost = len(law.torque) * cost_of_left(law, np.full(n, np.sqrt(left / n)))
         yield FormCandidate(form, shape, law, free, k, float(cost + _price(law, k, form.chosen)))
 
 
@@ -129,13 +129,13 @@ def fitted_with_times(best: FormCandidate, given: PI) -> tuple[FormCandidate, Fi
     """
     fitted = fitted_form(best, given)
     for _ in range(ROUNDS):
-        best, fitted = _again(best, about(best.law, _shape_of(best, fitted)), fitted, given)
-    there = _again(best, on_samples(best.law, _shape_of(best, fitted)), fitted, given)
-    there = _again(there[0], about(there[0].law, _shape_of(*there)), there[1], given)
+        best, fitted = _again(best, about(best.law, shape_of(best, fitted)), fitted, given)
+    there, refitted = _again(best, on_samples(best.law, shape_of(best, fitted)), fitted, given)
+    there, refitted = _again(there, about(there.law, shape_of(there, refitted)), refitted, given)
     n, jumps = len(best.law.torque), 0 if best.law.lost is None else int(np.sum(best.law.lost.steps.unsure.jump))
     choices = 2.0 * jumps * np.log(best.law.every)  # no decision: a formula
-    cheaper = n * cost_of_shape(there[0].law, _shape_of(*there)) + choices < n * cost_of_shape(best.law, _shape_of(best, fitted))
-    return there if cheaper else (best, fitted)
+    free, chosen = (n * cost_of_left(c.law, shape_of(c, f).left) for c, f in ((best, fitted), (there, refitted)))
+    return (there, refitted) if chosen + choices < free else (best, fitted)
 
 
 def _again(best: FormCandidate, law: Law, fitted: Fitted, given: PI) -> tuple[FormCandidate, Fitted]:
@@ -144,11 +144,11 @@ def _again(best: FormCandidate, law: Law, fitted: Fitted, given: PI) -> tuple[Fo
     table = law.columns(best.shape.places, filters) @ best.form.of_columns(len(numbers), law.period)
     fixed, moved = best.form.constraints(given, len(law.lengths))
     free = least(table @ moved, law.logged - table @ fixed)[0]
-    again = replace(best, law=law, shape=_shape_of(best, fitted), free=free)
+    again = replace(best, law=law, shape=shape_of(best, fitted), free=free)
     return again, fitted_form(again, given)
 
 
-def _shape_of(best: FormCandidate, fitted: Fitted) -> Shape:
+def shape_of(best: FormCandidate, fitted: Fitted) -> Shape:
     """What the numbers make, and what they leave."""
     numbers, filters, _ = fitted
     coefficients = best.form.of_columns(len(numbers), best.law.period) @ numbers

@@ -339,6 +339,7 @@ def _starts(kind: type[LowPass] | type[Notch]) -> list[Vector]:
 
 
 def solved_shape(law: Law, places: tuple[Place, ...], numbers: Vector) -> Shape:
+    """Filters with these numbers, and the gains that leave least beside them."""
     table, sizes = _scaled(law.columns(places, numbers))
     coefficients = np.linalg.lstsq(table, law.logged, rcond=1e-12)[0]
     return Shape(places, numbers, coefficients / sizes, law.logged - table @ coefficients)

@@ -24,7 +24,15 @@ from gaident.control.pi import PI
 from gaident.data.record import Record
 from gaident.diagnosis.controller.form import FEEDS, FIRST_FEED, GAINS, Form, FormCandidate, controller_of, found_of, named
 from gaident.diagnosis.controller.form_between import jumps_of
-from gaident.diagnosis.controller.form_comparison import compared, fitted_form, fitted_with_times, gains_of, rivals_of
+from gaident.diagnosis.controller.form_comparison import (
+    Fitted,
+    compared,
+    fitted_form,
+    fitted_with_times,
+    gains_of,
+    rivals_of,
+    shape_of,
+)
 from gaident.diagnosis.controller.form_regression import Law, law_of, quiet_law
 from gaident.diagnosis.controller.slow_forms import limited, run_error, too_fast
 from gaident.diagnosis.library.settings import OF_SETTING
@@ -96,14 +104,13 @@ def _form_of(
     if not candidates:
         return None
     if law.every > 1:
-        following = _following(candidates, given, floor, 0.0)
-        unsure = jumps_of(records, law.every) if between and following is None else None
+        following = _following(candidates, given, floor)
+        unsure = jumps_of(records, law.every) if between and (following is None or not following.strictly) else None
         if unsure is not None:
             told = _told(records, given, compared(law, given, floor, unknown, unsure))
             if told is not None:
                 return _with_limit(told.records, given, told.candidates, told.fitted)
-        negligible = POLICY.negligible * float(np.abs(law.torque).max())
-        return _shown_slowly(records, given, candidates, _following(candidates, given, floor, negligible))
+        return _shown_slowly(records, given, candidates, following)
     shown = _shown(records, law, given, candidates) if candidates[0].names else None
     return shown or _shown_quietly(records, law, given, floor, unknown)
 
@@ -153,30 +160,38 @@ def _simplest_first(candidates: Sequence[FormCandidate]) -> list[FormCandidate]:
     """The forms to try: where the given gains leave as little, settings without a number of their own, before other numbers."""
     plain = [c for c in candidates if not c.names]
     as_free = [c for c in candidates if plain and c.count == plain[0].count and c.shape is plain[0].shape and not c.form.free]
-    return [*as_free[:1], *plain[:1], candidates[0]]
+    return list(dict.fromkeys([*as_free[:1], *plain[:1], candidates[0]]))
 
 
-def _following(candidates: Sequence[FormCandidate], given: PI, floor: float, negligible: float) -> FormCandidate | None:
-    """The first that leaves of a slower log no more than another velocity between its lines could make; None: there is none.
+class _Following(NamedTuple):
+    """A form from which the torque of a slower log follows; fitted: its numbers, see `fitted_form`.
 
-    negligible: what may be left in any case [N m].
+    strictly: it leaves no more than another velocity between the lines could make; else what is negligible.
     """
+
+    form: FormCandidate
+    fitted: Fitted
+    strictly: bool
+
+
+def _following(candidates: Sequence[FormCandidate], given: PI, floor: float) -> _Following | None:
+    """The first form that leaves no more than another velocity between the lines could make, or what is negligible; or None."""
     for best in _simplest_first(candidates):
-        law, (numbers, filters, _) = best.law, fitted_form(best, given)
-        left = law.logged - law.columns(best.shape.places, filters) @ (best.form.of_columns(len(numbers), law.period) @ numbers)
-        least = float(np.hypot(floor, law.unseen(best.shape)))
-        follows = _rms([left]) <= max(POLICY.near_rounding * least, negligible)
-        if follows and not too_fast(controller_of(best, numbers, filters, given, law.period), law.every * law.period):
-            return best
+        law, fitted = best.law, fitted_form(best, given)
+        rms, least = shape_of(best, fitted).rms, float(np.hypot(floor, law.unseen(best.shape)))
+        strictly = rms <= POLICY.near_rounding * least
+        follows = strictly or rms <= POLICY.negligible * float(np.abs(law.torque).max())
+        if follows and not too_fast(controller_of(best, *fitted[:2], given, law.period), law.every * law.period):
+            return _Following(best, fitted, strictly)
     return None
 
 
 def _shown_slowly(
-    records: Sequence[Record], given: PI, candidates: Sequence[FormCandidate], following: FormCandidate | None
+    records: Sequence[Record], given: PI, candidates: Sequence[FormCandidate], following: _Following | None
 ) -> Shown | None:
     """The same for a slower log, where a form follows, with the limits that it has; else None."""
     if following is not None:
-        shown = _with_limit(records, given, _first(following, candidates), fitted_form(following, given))
+        shown = _with_limit(records, given, _first(following.form, candidates), following.fitted)
         if shown is not None:
             return shown
     # Noise on the logged velocity leaves more than interpolation; with a limit the given controller may explain all of it.
@@ -191,7 +206,7 @@ class _Told(NamedTuple):
 
     records: tuple[Record, ...]
     candidates: list[FormCandidate]
-    fitted: tuple[Vector, Vector, Matrix]
+    fitted: Fitted
 
 
 def _told(records: Sequence[Record], given: PI, candidates: Sequence[FormCandidate]) -> _Told | None:
@@ -201,7 +216,7 @@ def _told(records: Sequence[Record], given: PI, candidates: Sequence[FormCandida
         controller = replace(controller_of(best, *fitted[:2], given, best.law.period), period=best.law.period)
         known = timed(records, limited(records, controller).controller)
         if not too_fast(controller, records[0].dt) and all(isinstance(rec, TimedRecord) for rec in known):
-            return _Told(known, [one, *(c for c in candidates if c is not best)], fitted)
+            return _Told(known, [one, *_first(best, candidates)[1:]], fitted)
     return None
 
 
@@ -218,13 +233,12 @@ def _shown_quietly(records: Sequence[Record], law: Law, given: PI, floor: float,
         if quiet is None or not candidates:
             continue
         best = candidates[0]
-        numbers, filters, cov = fitted_form(best, given)
-        made = quiet.columns(best.shape.places, filters) @ (best.form.of_columns(len(numbers), law.period) @ numbers)
-        left = quiet.logged - made
+        fitted = fitted_form(best, given)
+        left = shape_of(best, fitted).left
         allowed = max(_allowed(records, law, given))
         exact = float(np.abs(left).max()) <= allowed
         if exact or white_noise(left, quiet.logged):
-            shown = _with_limit(records, given, candidates, (numbers, filters, cov))
+            shown = _with_limit(records, given, candidates, fitted)
             return None if shown is None else replace(shown, exact=exact)
     return None
 
@@ -233,7 +247,7 @@ def _with_limit(
     records: Sequence[Record],
     given: PI,
     candidates: Sequence[FormCandidate],
-    fitted: tuple[Vector, Vector, Matrix],
+    fitted: Fitted,
     part: float = POLICY.better_reason,
 ) -> Shown | None:
     """A form that was shown where no limit acts, and the limit; None where there is neither, or the whole torque fits no better.
@@ -247,11 +261,8 @@ def _with_limit(
     if not best.names and not at_limit.gain and (law.lost is None or not best.form.unknown):
         return None
     plain = Cascade(given, law.period)
-    # Each controller with the times at which the command jumped in its eyes.
-    before, after = (
-        run_error(records if law.lost is None else timed(records, plain), plain),
-        run_error(records, at_limit.controller),
-    )
+    as_given = records if law.lost is None else timed(records, plain)  # with the times that the given controller would tell
+    before, after = run_error(as_given, plain), run_error(records, at_limit.controller)
     size = float(np.std(np.concatenate([r.torque for r in records if r.torque is not None])))
     slow = law.every > 1
     if not after < (min(part, POLICY.each_number) if slow else part) * before or (slow and after > POLICY.replay_noise * size):

@@ -4,10 +4,11 @@ The steps D of the torque (`identification.replay.line_steps`) are linear in the
 
     D = X P + C (s - s_i0) + v,   s normal with the mean s_usual and the deviations S
 
-so with the noise v whitened (of variance 1) the shares are integrated out:
+so with the noise v whitened the shares are integrated out:
 
-    D - C (s_usual - s_i0) = X P + e,   cov(e) = 1 + C S^2 C' = L L',   L^-1 D = L^-1 X P + white noise
+    D - C (s_usual - s_i0) = X P + e,   cov(e) = V + C S^2 C' = L L',   L^-1 D = L^-1 X P + white noise
 
+V is diagonal: 1 for the noise, and for each step the squares of what other velocities between the lines would change of it.
 C falls to 0 within few lines, so L has few diagonals.
 C needs the numbers: it is made with those that were found so far, about the shares s_i0 that were.
 (Generalized least squares; Aitken 1935.)
@@ -80,7 +81,7 @@ class LostTimes:
 
     @property
     def cost(self) -> float:
-        """ln det(1 + C S^2 C')."""
+        """ln det(V + C S^2 C')."""
         return float(2.0 * np.sum(np.log(self.factor[0])))  # no decision: a formula
 
     def _solved(self, rows: Matrix, trans: str = "N") -> Matrix:

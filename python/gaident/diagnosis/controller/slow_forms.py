@@ -28,7 +28,7 @@ __all__ = ["Limited", "limited", "run_error", "too_fast"]
 Vector = NDArray[np.float64]
 
 SUM_ROUNDING = 1e-9  # no decision: of a torque, what a sum is exact to
-TIME_EXACT = 1e-10  # no decision: of a search, of the logarithm of a time
+TIME_EXACT = 1e-10  # no decision: of a solver: where its search ends, of the logarithm of a time
 TIMES = np.geomspace(0.3e-3, 0.3, POLICY.tracking_times)  # no decision: a start; s
 NEXT_TIME = float(TIMES[1] / TIMES[0])
 
