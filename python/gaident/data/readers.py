@@ -125,8 +125,9 @@ def read(
     dt : float, optional
         Sample time [s].
         None: from the column named for time, or one called as time is (time, t, __time, timestamp, /topic/header/stamp, ...),
-        which must be regular, or what the file states. With dt and such a column, both must agree within 1 %,
-        and rows that are lost or doubled by its stamps, or a time that goes back, are refused.
+        which must be regular, or what the file states.
+        With dt and such a column, both must agree within 1 %, and rows that are lost or doubled by its stamps, or a time that
+        goes back, are refused.
     name : str, optional
         Name of the record; None: the file's name without its ending.
     counts_per_turn : float, optional
