@@ -51,11 +51,11 @@ from gaident.diagnosis.records.hygiene import cleaned, left_out, quantisation, u
 from gaident.diagnosis.records.sizes import scales_of
 from gaident.diagnosis.selection import attribution
 from gaident.diagnosis.selection.offset import Offset, offset_of
-from gaident.diagnosis.selection.other_gains import OTHER_GAINS, OtherGains, gain_doubt, under_given
 from gaident.diagnosis.selection.rivals import Replacement
 from gaident.diagnosis.selection.select import Selection, by_whitened_errors, compared, selected
 from gaident.diagnosis.selection.sensor_age import searched
-from gaident.diagnosis.selection.unlogged_form import UnloggedForm, in_series, leaves_noise, unlogged_form
+from gaident.diagnosis.unlogged.other_gains import OTHER_GAINS, OtherGains, gain_doubt, under_given
+from gaident.diagnosis.unlogged.unlogged_form import UnloggedForm, in_series, leaves_noise, unlogged_form
 from gaident.estimation.dataset import DataSet
 from gaident.estimation.found_numbers import covariance_of_numbers
 from gaident.estimation.objective import Fit, Objective

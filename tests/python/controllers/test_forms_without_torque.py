@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 import gaident as ga
+from drive_rig import Noise, Plant, rig, skip_without_library
 from gaident.diagnosis.explain.wording import or_other_form
-from gaident.diagnosis.selection.unlogged_form import VARIANTS
+from gaident.diagnosis.unlogged.controller_forms import VARIANTS
 
 DT = 1e-3
 KP, KI = 0.05, 1.5
@@ -15,15 +16,17 @@ J, D = 3e-4, 2e-3
 PI = ga.PI(KP, KI)
 
 
+@pytest.fixture(autouse=True)
+def _library() -> None:
+    skip_without_library()
+
+
 def record(controller: ga.Cascade, friction: float = 0.0) -> ga.Record:
-    """One mass under a controller, noise of 0.03 rad/s in the loop, no torque in the log."""
-    rng = np.random.default_rng(2)
+    """One mass under a controller that reads a velocity with noise of 0.03 rad/s, no torque in the log."""
     levels = np.repeat([0, 20.0, -35, 10, -10, 50, -50, 25, -5, 5, -20, 40, -30, 15, -15, 0], 90)
-    noise = 0.03 * rng.standard_normal(len(levels))
-    drive = ga.OneMass(J=J, D=D).model()
-    drive = drive.with_effect("coulomb_friction", torque=friction) if friction else drive
-    done = ga.run(drive, ga.Record(DT, command=levels - noise, velocity=np.zeros(len(levels))), controller)
-    return ga.Record(DT, command=levels, velocity=done.velocity + noise)
+    plant = Plant(J, D, KP, KI, DT, cascade=controller)
+    effects = {"coulomb_friction": {"torque": friction}} if friction else {}
+    return rig(plant, levels, effects, Noise(white=0.03), seed=2, torque_logged=False)
 
 
 @pytest.mark.parametrize(
@@ -35,6 +38,7 @@ def record(controller: ga.Cascade, friction: float = 0.0) -> ga.Record:
             {"frequency": 60.0, "numerator_damping": 0.1, "denominator_damping": 0.7},
         ),
         (ga.Cascade(PI, velocity_filters=(ga.LowPass(2e-3),)), "velocity_feedback_filter", {"time_constant": 2e-3}),
+        (ga.Cascade(PI, command_filters=(ga.LowPass(4e-3),)), "command_filter", {"time_constant": 4e-3}),
     ],
 )
 def test_a_filter_that_was_not_given_is_found_and_is_no_mechanics(
@@ -58,6 +62,33 @@ def test_a_filter_is_found_beside_friction() -> None:
     dia = ga.diagnose(record(ga.Cascade(PI, velocity_filters=(ga.LowPass(2e-3),)), friction=0.05), PI)
     assert {f.effect for f in dia.causes} == {"velocity_feedback_filter", "coulomb_friction"}, dia.summary()
     assert dia.mechanics["inertia"].value == pytest.approx(J, rel=5e-3)
+
+
+def test_an_ip_controller_is_found_although_it_looks_like_a_lag_and_more_damping() -> None:
+    """On one mass an IP loop is to its command what a PI loop with a lag of kp/ki on a more damped mass is."""
+    dia = ga.diagnose(record(ga.Cascade(ga.PI(KP, KI, command_weight=0.0))), PI)
+    (found,) = dia.causes
+    assert (dia.verdict, found.effect) == ("explained", "command_weight"), dia.summary()
+    weight, inertia = found.parameters["weight"], dia.mechanics["inertia"]
+    assert abs(weight.value) < max(3.0 * weight.std, 1e-3)
+    assert abs(inertia.value - J) < 3.0 * inertia.std < 0.01 * J
+
+
+def test_a_notch_at_the_resonance_of_two_masses_is_found() -> None:
+    """The mechanism that is found under the bare PI has an inertia that is far off; the one under the notch is found anew."""
+    notch = ga.Notch(29.0, numerator_damping=0.07, denominator_damping=0.7)
+    pi = ga.PI(0.0232, 1.367)
+    plant = Plant(
+        1.02e-4, 3.13e-3, pi.kp, pi.ki, 2.5e-4, 6.97e-4, 9.11e-3, 2.63, 1e-3, cascade=ga.Cascade(pi, torque_filters=(notch,))
+    )
+    levels = np.repeat([0, 20.0, -35, 10, -10, 50, -50, 25, -5, 5, -20, 40, -30, 15, -15, 0], 360)
+    log = rig(plant, levels, noise=Noise(white=0.03), seed=2, torque_logged=False)
+    dia = ga.diagnose(log, pi)
+    (found,) = dia.causes
+    assert (dia.verdict, found.effect) == ("explained", "torque_filter"), dia.summary()
+    assert abs(found.parameters["frequency"].value - notch.frequency) < 4.0 * found.parameters["frequency"].std
+    total = dia.mechanics["motor_inertia"].value + dia.mechanics["load_inertia"].value
+    assert total == pytest.approx(plant.J + plant.JL, rel=0.01)
 
 
 def test_what_comes_closer_is_no_other_part_of_a_controller_that_has_none() -> None:

@@ -15,7 +15,7 @@ from gaident import _core
 from gaident.diagnosis.records.sizes import scales_of
 from gaident.diagnosis.selection import select, sensor_age
 from gaident.diagnosis.selection.bases import Task
-from gaident.diagnosis.selection.under_controller import UnderController, out_of_reach
+from gaident.diagnosis.unlogged.under_controller import UnderController, out_of_reach
 from gaident.estimation import least_squares as ls
 from gaident.estimation.dataset import DataSet
 from gaident.estimation.noise_model import WHITE

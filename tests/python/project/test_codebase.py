@@ -41,6 +41,7 @@ ROOMS = [
         "diagnosis/records",
         "diagnosis/library",
         "diagnosis/selection",
+        "diagnosis/unlogged",
         "diagnosis",
         "diagnosis/controller",
         "diagnosis/experiments",

@@ -41,7 +41,7 @@ from gaident.diagnosis.explain.wording import evidence_of, or_other_form
 from gaident.diagnosis.library.equivalences import EQUIVALENT
 from gaident.diagnosis.records.folded import ADVICE
 from gaident.diagnosis.selection.offset import Offset
-from gaident.diagnosis.selection.unlogged_form import VARIANTS
+from gaident.diagnosis.unlogged.controller_forms import VARIANTS
 from gaident.drive.draft import draft
 from gaident.errors import GaidentError, RecordError, SettingsError
 from gaident.identification.notes import open_loop_notes

@@ -21,8 +21,8 @@ from gaident.diagnosis.controller.limit_not_given import by_a_limit
 from gaident.diagnosis.controller.log_shift import Aligned, aligned
 from gaident.diagnosis.controller.measured_lag import Lag, commanded, lag_shown
 from gaident.diagnosis.controller.other_form import other_form
-from gaident.diagnosis.selection.other_gains import OTHER_GAINS, OtherGains
-from gaident.diagnosis.selection.unlogged_form import UnloggedForm
+from gaident.diagnosis.unlogged.other_gains import OTHER_GAINS, OtherGains
+from gaident.diagnosis.unlogged.unlogged_form import UnloggedForm
 from gaident.identification.logged_torque import comparable, corrected, not_followed
 from gaident.identification.replay.driven_records import Driven
 from gaident.identification.replay.replay import replay

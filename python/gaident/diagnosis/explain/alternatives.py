@@ -9,8 +9,8 @@ from gaident.diagnosis.library.equivalences import equivalents, impossible
 from gaident.diagnosis.library.sides import name_of
 from gaident.diagnosis.library.terms import LIBRARY, conditional_classes, level_of
 from gaident.diagnosis.selection.offset import Offset
-from gaident.diagnosis.selection.other_gains import OTHER_GAINS
 from gaident.diagnosis.selection.rivals import Replacement
+from gaident.diagnosis.unlogged.other_gains import OTHER_GAINS
 from gaident.models.effect_rows import SHAFT
 from gaident.results.estimate import Estimate
 

@@ -26,6 +26,7 @@ from gaident.policy.table import POLICY
 __all__ = [
     "as_one_mass",
     "as_two_masses",
+    "balanced",
     "balanced_on_a_spring",
     "drives_itself",
     "evenly_damped",
@@ -48,12 +49,15 @@ Matrix = NDArray[np.float64]
 
 
 def one_mass(data: DataSet, identified: Model) -> Model:
-    """Inertia and damping from the balance of momentum, w = K int u dt - A int w dt + w(0); or the identified ones.
+    """The identified inertia and damping, or those of the balance of momentum."""
+    return identified if (identified.p, identified.q) == (1, 0) and identified.gain > 0.0 else balanced(data)
+
+
+def balanced(data: DataSet) -> Model:
+    """Inertia and damping from the balance of momentum, w = K int u dt - A int w dt + w(0), which needs no start.
 
     The gain is positive: below the resonance of a pendulum the balance alone would have a negative inertia.
     """
-    if (identified.p, identified.q) == (1, 0) and identified.gain > 0.0:
-        return identified
     gram, right = np.zeros((2, 2)), np.zeros(2)
     for r in data.driven:
         columns = np.vstack([np.cumsum(held_torque(r)), -np.cumsum(r.velocity)]) * r.dt

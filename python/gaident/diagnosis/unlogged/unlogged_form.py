@@ -15,8 +15,7 @@ It is judged by the criterion that selected the model.
 
 from __future__ import annotations
 
-import itertools
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -25,19 +24,18 @@ from numpy.typing import NDArray
 
 from gaident.axis import Text, joined, say, unit_text
 from gaident.control.cascade import Cascade
-from gaident.control.filters import LowPass, Notch
 from gaident.control.found import NUMBER_STEP, FoundNumbers
 from gaident.control.pi import PI
 from gaident.diagnosis.selection.moves import Moves
-from gaident.diagnosis.selection.other_gains import OTHER_GAINS
-from gaident.diagnosis.selection.under_controller import UnderController, out_of_reach
-from gaident.estimation import least_squares as ls
+from gaident.diagnosis.unlogged.anew import best_on_a_shaft, dry_friction, linear_mechanisms, with_term, with_usual_effects
+from gaident.diagnosis.unlogged.controller_forms import VARIANTS, ControllerForm
+from gaident.diagnosis.unlogged.other_gains import OTHER_GAINS
+from gaident.diagnosis.unlogged.under_controller import UnderController, out_of_reach
 from gaident.estimation.criterion import cost_of
 from gaident.estimation.noise_model import WHITE
 from gaident.estimation.objective import Fit, Objective
 from gaident.estimation.prediction import OpenLoop
 from gaident.estimation.projection import project_out
-from gaident.policy.table import POLICY
 from gaident.results.estimate import Estimate
 from gaident.results.finding import Finding
 
@@ -45,127 +43,6 @@ __all__ = ["UnloggedForm", "in_series", "leaves_noise", "unlogged_form"]
 
 Vector = NDArray[np.float64]
 Matrix = NDArray[np.float64]
-
-
-@dataclass(frozen=True, eq=False)
-class _Number:
-    """A number of a form: name and unit for the finding; bounds and starts for (sample time, duration) [s].
-
-    logarithm: whether it is searched by its logarithm.
-    """
-
-    name: str
-    unit: str
-    ends: Callable[[float, float], tuple[float, float]]
-    starts: Callable[[float, float], Sequence[float] | Vector]
-    logarithm: bool = True
-
-    def moved(self, value: float) -> float:
-        """The value as the search moves it."""
-        return float(np.log(value)) if self.logarithm else float(value)
-
-    def value(self, z: float) -> float:
-        """The value of what the search moves."""
-        return float(np.exp(z)) if self.logarithm else float(z)
-
-    def estimate(self, z: float, std: float) -> Estimate:
-        """The value with its deviation; std: of z."""
-        value = self.value(z)
-        return Estimate(value, std * value if self.logarithm else std, self.unit)
-
-
-@dataclass(frozen=True, eq=False)
-class _Variant:
-    """A form with its numbers; controller: of the given PI and their values. words: what it has, for a sentence."""
-
-    finding: str
-    words: Text
-    numbers: tuple[_Number, ...]
-    controller: Callable[..., Cascade]
-
-    def of(self, pi: PI, z: Vector) -> Cascade:
-        """The controller with the numbers z as the search moves them."""
-        return self.controller(pi, *(number.value(x) for number, x in zip(self.numbers, z, strict=True)))
-
-    def named(self, z: Vector, covariance: Matrix) -> dict[str, dict[str, tuple[float, float]]]:
-        """Finding -> parameter -> (value, standard deviation), of numbers as the search moves them."""
-        found = zip(self.numbers, z, np.sqrt(np.diag(covariance)), strict=True)
-        estimates = {n.name: n.estimate(float(x), float(std)) for n, x, std in found}
-        return {self.finding: {name: (e.value, e.std) for name, e in estimates.items()}}
-
-    def ends(self, dt: float, duration: float) -> tuple[Vector, Vector]:
-        """(lowest, highest) z."""
-        low, high = np.array([[n.moved(end) for end in n.ends(dt, duration)] for n in self.numbers]).T
-        return low, high
-
-    def starts(self, dt: float, duration: float) -> list[Vector]:
-        """Every z that a search begins at."""
-        grids = ([n.moved(start) for start in n.starts(dt, duration)] for n in self.numbers)
-        return [np.array(z) for z in itertools.product(*grids)]
-
-
-def _band(dt: float, duration: float) -> tuple[float, float]:
-    return 1.0 / (POLICY.form_slowest * duration), POLICY.notch_highest * 0.5 / dt
-
-
-REACH = (1.0 + POLICY.gain_doubt) / (1.0 - POLICY.gain_doubt)
-"""Largest ratio of ki/kp to the given one."""
-
-RATIO = _Number("integral_gain", "1", lambda dt, duration: (1.0 / REACH, REACH), lambda dt, duration: (1.0,))
-WEIGHT = _Number("weight", "1", lambda dt, duration: (0.0, POLICY.form_weight), lambda dt, duration: (0.0, 0.5), logarithm=False)
-TIME_CONSTANT = _Number(
-    "time_constant",
-    "s",
-    lambda dt, duration: (POLICY.form_fastest * dt, POLICY.form_slowest * duration),
-    # no decision: a start
-    lambda dt, duration: np.geomspace(0.5 * dt, 0.1 * POLICY.form_slowest * duration, POLICY.form_starts),
-)
-FREQUENCY = _Number(
-    "frequency", "Hz", _band, lambda dt, duration: np.geomspace(*_band(dt, duration), 2 * POLICY.form_starts + 1)[1:-1]
-)
-# From undamped zeros to real ones, with which a filter has no notch.
-OF_ZEROS = _Number("numerator_damping", "1", lambda dt, duration: (0.0, 1.0), lambda dt, duration: (0.1,), logarithm=False)
-OF_POLES = _Number(
-    "denominator_damping",
-    "1",
-    lambda dt, duration: (POLICY.notch_least_damping, POLICY.notch_most_damping),
-    lambda dt, duration: (0.7,),
-)
-
-VARIANTS: tuple[_Variant, ...] = (
-    _Variant(OTHER_GAINS, Text("other gains"), (RATIO,), lambda pi, ratio: Cascade(replace(pi, ki=pi.ki * ratio))),
-    _Variant(
-        "command_weight", Text("a command weight"), (WEIGHT,), lambda pi, weight: Cascade(replace(pi, command_weight=weight))
-    ),
-    _Variant(
-        "torque_filter",
-        say("a low pass of the {torque}"),
-        (TIME_CONSTANT,),
-        lambda pi, tau: Cascade(pi, torque_filters=(LowPass(time_constant=tau),)),
-    ),
-    _Variant(
-        "torque_filter",
-        say("a notch in the {torque}"),
-        (FREQUENCY, OF_ZEROS, OF_POLES),
-        lambda pi, *notch: Cascade(pi, torque_filters=(Notch(*notch),)),
-    ),
-    _Variant(
-        "velocity_feedback_filter",
-        Text("a low pass of the velocity that it reads"),
-        (TIME_CONSTANT,),
-        lambda pi, tau: Cascade(pi, velocity_filters=(LowPass(time_constant=tau),)),
-    ),
-    _Variant(
-        "command_filter",
-        Text("a low pass of the command"),
-        (TIME_CONSTANT,),
-        lambda pi, tau: Cascade(pi, command_filters=(LowPass(time_constant=tau),)),
-    ),
-)
-"""Forms that a drive's controller often has, and other gains, which come first where they explain as much.
-
-A rule of integration moves kp by less than a thousandth at a drive's clock.
-"""
 
 
 @dataclass(frozen=True)
@@ -199,8 +76,9 @@ def in_series(fit: Fit) -> tuple[str, ...]:
 
 
 def unlogged_form(space: Moves, final: Fit) -> UnloggedForm | None:
-    """The form of controller with which the selected model, with or without its effects in series, explains the records best.
+    """The form of controller with which a model explains the records best.
 
+    Searched beside the selected model, with or without its effects in series, and beside mechanisms that are found anew.
     None where a torque is logged, or where the loop is not closed by a bare PI from rest.
     None also where the model leaves noise and contains no effect in series, which a filter could replace.
     """
@@ -215,7 +93,13 @@ def unlogged_form(space: Moves, final: Fit) -> UnloggedForm | None:
         bases += [final] * bool(series) + [_without(space, final, final.effects)] * (set(final.effects) > set(series))
     starts = _promising(space, objective, data.pi, [_opened(space, base) for base in bases])
     if not leaves_noise(space, final):
-        starts += [(v, under, _with_friction(space, base), z) for v, under, base, z in starts if not _rubs(base)]
+        starts += [
+            (v, under, with_term(objective, base, friction), z)
+            for v, under, base, z in starts
+            for friction in dry_friction(space)
+            if not _rubs(base)
+        ]
+    starts += [(form, under, fit, z) for form in VARIANTS for under, fit, z in _anew(space, objective, final, form)]
     beyond = max(out_of_reach(space, f) for f in (final, _opened(space, final)))
     found = [_fitted(space, objective, beyond, *one) for one in starts]
     known = [f for f in found if f is not None]
@@ -246,30 +130,19 @@ def _rubs(fit: Fit) -> bool:
     return any(term.levels for term in fit.parameters.terms)
 
 
-def _with_friction(space: Moves, fit: Fit) -> Fit:
-    """The fit with dry friction, which nearly every axis has, and which a torque that lacks a filter may hide."""
-    term = next((t for t in space.allowed if t.levels and t.simplest), None)
-    if term is None:
-        return fit
-    longer = fit.hypothesis.extended(term)
-    starts = np.array([fit.parameters.inserted(fit.x, np.array(row)) for row in term.starts(longer.parameters.scales)])
-    start = starts[int(np.argmin(space.objective.costs(longer, starts, WHITE)))]
-    return ls.fit(space.objective, longer, start, WHITE, POLICY.short)
-
-
 def _opened(space: Moves, fit: Fit) -> Fit:
     """The fit as driven by the torque."""
     return space.predicted_by(fit, OpenLoop(space.data, fit.predictor.own_angle)) if fit.predictor.closed else fit
 
 
-_Start = tuple[_Variant, UnderController, Fit, Vector]
-_End = tuple[Fit, float, _Variant, FoundNumbers, Vector]
+_Start = tuple[ControllerForm, UnderController, Fit, Vector]
+_End = tuple[Fit, float, ControllerForm, FoundNumbers, Vector]
 
 
 def _promising(space: Moves, objective: Objective, pi: PI, bases: list[Fit]) -> list[_Start]:
     """Each form beside each model at its best start, the model refitted there to first order."""
     tried = sorted(_starts(space, objective, pi, bases), key=lambda one: one[0])
-    chosen: dict[tuple[_Variant, Fit], _Start] = {}
+    chosen: dict[tuple[ControllerForm, Fit], _Start] = {}
     for _, start in tried:
         variant, _, base, _ = start
         chosen.setdefault((variant, base), start)
@@ -278,20 +151,41 @@ def _promising(space: Moves, objective: Objective, pi: PI, bases: list[Fit]) -> 
 
 def _starts(space: Moves, objective: Objective, pi: PI, bases: list[Fit]) -> Iterator[tuple[float, _Start]]:
     """(what is left there, start) of each form, at each of its starts."""
-    dt, duration = space.data.dt, max(len(r) * r.dt for r in space.data.records)
     for base in bases:
         for variant in VARIANTS:
-            low, high = variant.ends(dt, duration)
-            under = UnderController(space.data, partial(variant.of, pi), low, high)
-            for row in variant.starts(dt, duration):
-                z = np.clip(row, low, high)
+            for under, z in _grid(space, pi, variant):
                 v, J = objective.linearised(under.of(base.hypothesis, z), base.x, WHITE)
                 left = project_out(J, v[None, :])[0]
                 yield float(left @ left), (variant, under, base, z)
 
 
+def _grid(space: Moves, pi: PI, form: ControllerForm) -> list[tuple[UnderController, Vector]]:
+    """Models under a form, with each of its starts."""
+    dt, duration = space.data.dt, max(len(r) * r.dt for r in space.data.records)
+    low, high = form.ends(dt, duration)
+    under = UnderController(space.data, partial(form.of, pi), low, high)
+    return [(under, np.clip(z, low, high)) for z in form.starts(dt, duration)]
+
+
+def _anew(space: Moves, objective: Objective, final: Fit, form: ControllerForm) -> list[tuple[UnderController, Fit, Vector]]:
+    """Mechanisms that are found anew under a form, each at that of its starts at which it leaves least.
+
+    The mechanism that was found under the given controller may be far off: its inertia by a multiple.
+    """
+    best: dict[int, tuple[UnderController, Fit, Vector]] = {}
+    assert space.data.pi is not None
+    for under, z in _grid(space, space.data.pi, form):
+        for fit in linear_mechanisms(final.parameters.scales, objective, under.over(z)):
+            kept = best.get(fit.parameters.masses)
+            if kept is None or fit.cost < kept[1].cost:
+                best[fit.parameters.masses] = under, fit, z
+    usual = [(under, with_usual_effects(space, objective, fit), z) for under, fit, z in best.values()]
+    grown = [(under, shaft, z) for under, fit, z in usual for shaft in best_on_a_shaft(objective, fit)]
+    return usual + grown
+
+
 def _fitted(
-    space: Moves, objective: Objective, beyond: float, variant: _Variant, under: UnderController, base: Fit, z: Vector
+    space: Moves, objective: Objective, beyond: float, variant: ControllerForm, under: UnderController, base: Fit, z: Vector
 ) -> _End | None:
     """(model, score, form, its numbers, their deviations) from one start; None where it diverges or ends at a bound.
 
@@ -301,15 +195,15 @@ def _fitted(
     if end is None:
         return None
     z, found = end
-    zero = (under.low == 0.0) & (z == 0.0)  # drives have a weight of 0, or zeros without damping
-    at_end = (z > under.high - NUMBER_STEP) | ((z < under.low + NUMBER_STEP) & ~zero)
+    # Drives have a weight of 0, or zeros without damping: an end at 0 is a value.
+    at_end = (z > under.high - NUMBER_STEP) | ((z < under.low + NUMBER_STEP) & (under.low != 0.0))
     if bool(at_end.any()):
         return None
     score = space.score(found) + cost_of(len(z), objective.information) + space.penalty
     return found, score, variant, replace(under.found(z), named=variant.named), under.deviations(objective, found, z)
 
 
-def _finding(variant: _Variant, z: Vector, stds: Vector, gain: float, others: list[Text]) -> Finding:
+def _finding(variant: ControllerForm, z: Vector, stds: Vector, gain: float, others: list[Text]) -> Finding:
     """What is reported of a form that takes the place of the given controller; others: forms that explain as much."""
     estimates = {n.name: n.estimate(x, float(std)) for n, x, std in zip(variant.numbers, z, stds, strict=True)}
     text = (

@@ -29,7 +29,7 @@ from gaident.control.found import NUMBER_STEP, FoundNumbers
 from gaident.control.pi import PI
 from gaident.diagnosis.selection.moves import Moves
 from gaident.diagnosis.selection.select import Selection
-from gaident.diagnosis.selection.under_controller import UnderController, out_of_reach
+from gaident.diagnosis.unlogged.under_controller import UnderController, out_of_reach
 from gaident.estimation import least_squares as ls
 from gaident.estimation.criterion import cost_of, gained
 from gaident.estimation.noise_model import WHITE

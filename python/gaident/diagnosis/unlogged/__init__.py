@@ -1,0 +1,1 @@
+"""Another controller than the given one as a hypothesis, where no torque is logged that shows what it made."""
