@@ -9,7 +9,7 @@ from typing import Any
 
 from gaident.axis import AXES
 from gaident.control.words import UNKNOWN
-from gaident.data.torque_kind import TORQUE_KINDS
+from gaident.data.torque_kind import TORQUE_KINDS, TORQUE_LOGS
 
 __all__ = ["SHELLS", "add_log_commands", "add_log_options", "gain", "number"]
 
@@ -139,6 +139,8 @@ def add_log_options(parser: argparse.ArgumentParser) -> None:
     g.add_argument("--shift", action="append", metavar="CH=N,...", help=shift)
     kinds = "commanded: by the controller; measured: a current times a constant (default: as its column's name says)"
     g.add_argument("--torque-is", choices=TORQUE_KINDS, help=f"what the torque is: {kinds}")
+    lines = "sample: its value at the line (default); mean: over the controller's samples since the line before"
+    g.add_argument("--torque-log", choices=TORQUE_LOGS, help=f"what a line contains of the torque: {lines}")
     for name, text in CONSTANT_HELP.items():
         g.add_argument(f"--{name.replace('_', '-')}", type=number, metavar="X", help=text)
     _add_text_options(g)

@@ -47,7 +47,7 @@ drive.toml, every part optional:
   screw = "10 mm"                 # of a motor on a screw whose log is in mm
   dt = 0.444e-3                   # s; also velocity_cutoff_hz, counts_per_turn, torque_constant,
                                   # rated_torque, torque_per_volt, gear_ratio, load_side, torque_is,
-                                  # decimate, resample, delimiter, decimal, skip, encoding
+                                  # torque_log, decimate, resample, delimiter, decimal, skip, encoding
   [columns]
   command = "w_ref"
   velocity = "w"

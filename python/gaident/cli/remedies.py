@@ -22,6 +22,7 @@ SAME_NAME = {
         "gear_ratio",
         "load_side",
         "torque_is",
+        "torque_log",
     ),
 }
 _OTHER_NAME = {"start": "from", "stop": "to"}

@@ -19,7 +19,10 @@ from numpy.typing import NDArray
 
 from gaident.policy.table import POLICY
 
-__all__ = ["Unsure", "at_the_clock", "between_lines", "cubics", "jumps_between", "straight_part", "unsure_between", "with_means"]
+__all__ = [
+    *("Unsure", "at_lines", "at_the_clock", "between_lines", "cubics", "jumps_between", "straight_part", "unsure_between"),
+    "with_means",
+]
 
 Vector = NDArray[np.float64]
 
@@ -35,6 +38,18 @@ def at_the_clock(line: Vector, every: int) -> Vector:
     steps = np.diff(line)
     steps = np.append(steps, steps[-1])
     return (line[:, None] + steps[:, None] * (np.arange(every) / every)).ravel()
+
+
+def at_lines(made: Vector, every: int, mean: bool, before: float = 0.0) -> Vector:
+    """What the lines of a log contain (..., n) of signals at the controller's samples (..., n r); before: what they were earlier.
+
+    The sample at each line, or, of a log of means, the mean of the r samples that end with it.
+    """
+    if not mean or every == 1:
+        return np.asarray(made[..., ::every])
+    earlier = np.full((*made.shape[:-1], every - 1), before)
+    whole = np.concatenate([earlier, made], axis=-1)[..., : made.shape[-1]]
+    return np.asarray(whole.reshape(*made.shape[:-1], -1, every).mean(axis=-1))
 
 
 def between_lines(line: Vector, every: int) -> Vector:

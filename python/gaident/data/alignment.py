@@ -13,6 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -264,8 +265,9 @@ def _result(
     axis = their_dt * np.arange(len(next(iter(theirs.values()))))
     ratio = rec.dt / (their_dt * (1.0 + fit.rate))
     new = {name: PchipInterpolator(axis, low_passed(theirs[name], ratio))(inner[start:stop]) for name in taken}
-    kind = other.torque_is if "torque" in taken and isinstance(other, Record) else None
-    record = rec.with_channels(torque_is=kind, **{**{name: values[start:stop] for name, values in mine.items()}, **new})
+    channels: Mapping[str, Any] = {name: values[start:stop] for name, values in mine.items()} | new
+    about = (other.torque_is, other.torque_log) if "torque" in taken and isinstance(other, Record) else (None, None)
+    record = rec.with_channels(torque_is=about[0], torque_log=about[1], **channels)
     far = max(abs(inner[start] - fit.centre), abs(inner[stop - 1] - fit.centre))
     uncertainty = 2.0 * float(np.hypot(fit.centre_std, far * fit.std[1]))
     return Alignment(record, fit.offset, fit.std[0], fit.rate, fit.std[1], seen, fit.gain, fit.correlation, uncertainty)

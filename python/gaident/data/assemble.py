@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import shlex
 from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,7 +22,7 @@ from gaident.data.signals.decimation import Decimator, decimated, factor_of
 from gaident.data.signals.difference import backward_difference
 from gaident.data.signals.resampling import resampled
 from gaident.data.timeaxis import SLOW_STEP, TimeAxis
-from gaident.data.torque_kind import COMMANDED, MEASURED, kind_of_torque
+from gaident.data.torque_kind import COMMANDED, MEAN, MEASURED, kind_of_torque
 from gaident.data.wanted import Wanted, si_factor
 from gaident.data.winding_torque import ELECTRICAL, torque_of_winding
 from gaident.errors import ReadError, RecordError
@@ -77,8 +78,9 @@ def assemble(table: LogTable, wanted: Wanted, stem: str) -> Record:
             values["torque"], kind, note = torque_of_winding(table, wanted, values, dt)
             said += [note] if note else []
         name = stem if wanted.name is None else wanted.name
-        channels = {channel: values.get(channel) for channel in CHANNELS}
-        rec = Record(dt, name=name, torque_is=kind, notes=(*counters.notes(), *said), **channels)
+        notes = (*counters.notes(), *said)
+        channels: dict[str, Any] = {channel: values.get(channel) for channel in CHANNELS}
+        rec = Record(dt, name=name, torque_is=kind, torque_log=_line_of(table, wanted, values), notes=notes, **channels)
         return rec.shifted(**wanted.shift) if wanted.shift else rec
     except RecordError as error:
         raise RecordError(f"{table.path}: {error.marked}") from None
@@ -101,6 +103,24 @@ def _torque_kind(table: LogTable, wanted: Wanted, column: Column | None) -> str:
             f"with {arg('columns', '...', 'torque')}, or leave torque_is out"
         )
     return wanted.torque_is
+
+
+def _line_of(table: LogTable, wanted: Wanted, values: Mapping[str, NDArray[np.float64]]) -> str:
+    """What a line contains of the torque that is read; one that was decimated or resampled with the log is a sample.
+
+    Raises ReadError where there is none.
+    """
+    if wanted.torque_log == MEAN and "torque" not in values:
+        raise ReadError(
+            f"{table.path}: {arg('torque_log', repr(MEAN))} speaks of the torque, but no such column is read; name it with "
+            f"{arg('columns', '...', 'torque')}, or leave torque_log out"
+        )
+    if wanted.torque_log == MEAN and (wanted.decimate > 1 or wanted.resample is not None):
+        raise ReadError(
+            f"{table.path}: a mean is one over the lines of the log itself: read it without decimate and resample, then use "
+            "rec.decimate"
+        )
+    return wanted.torque_log
 
 
 def _known_by_name(kind: str, wanted: Wanted) -> list[Text]:

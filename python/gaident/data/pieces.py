@@ -119,9 +119,9 @@ def read_pieces(
     if short:
         note = f"{short} {'piece' if short == 1 else 'pieces'} of the log of fewer than {MINIMUM_SAMPLES} samples left out."
         first = found[0]
-        found[0] = Record(
-            first.dt, name=first.name, torque_is=first.torque_is, notes=(*first.notes, note), **dict(first.channels())
-        )
+        channels: dict[str, Any] = dict(first.channels())
+        kind, line = first.torque_is, first.torque_log
+        found[0] = Record(first.dt, name=first.name, torque_is=kind, torque_log=line, notes=(*first.notes, note), **channels)
     return found
 
 

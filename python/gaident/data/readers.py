@@ -24,6 +24,7 @@ from gaident.data.formats.sinumerik import open_sinumerik
 from gaident.data.formats.table import Column, LogTable
 from gaident.data.formats.time_names import time_and_unit
 from gaident.data.record import Record
+from gaident.data.torque_kind import SAMPLE
 from gaident.data.wanted import wanted_of
 from gaident.errors import ReadError
 
@@ -96,6 +97,7 @@ def read(
     load_side: str | Sequence[str] = (),
     measured: bool = True,
     torque_is: str | None = None,
+    torque_log: str = SAMPLE,
     shift: Mapping[str, int] | None = None,
     delimiter: str | None = None,
     decimal: str | None = None,
@@ -164,6 +166,8 @@ def read(
         Whether the torque is the controller's command, or a measured current times a constant, with the sensor's noise.
         None: measured where the column's name says so (`Actual current`, `I_q`, `M_ist`, `torque feedback`), else commanded.
         The record's repr shows which it is.
+    torque_log : {"sample", "mean"}
+        What a line contains of it: its value there, or its mean since the line before, see `Record`.
     shift : mapping of str to int, optional
         Channel -> samples by which it is moved against the others, where the log wrote it on another line.
         {"torque": -1} is for a torque that was logged one sample late; see `Record.shifted`.
@@ -222,6 +226,7 @@ def read(
         load_side=load_side,
         measured=measured,
         torque_is=torque_is,
+        torque_log=torque_log,
         shift=shift,
     )
     with open_log(path, TextOptions(delimiter, decimal, skip, encoding)) as table:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import math
 import os
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields
@@ -17,18 +16,23 @@ from gaident.checks import one_of
 from gaident.data.record_checks import (
     check_bounds,
     complete,
+    decimated_channels,
     digest_of,
     equally_long,
     moved_channels,
+    sample_at,
     sample_time,
+    saved_fields,
     slice_bounds,
+    still_driven,
     texts,
     torque_kind,
+    torque_line,
     unwrapped,
 )
 from gaident.data.signals.arrays import MINIMUM_SAMPLES, channel
-from gaident.data.signals.decimation import decimated, factor_of
-from gaident.data.torque_kind import COMMANDED, MEASURED
+from gaident.data.signals.decimation import factor_of
+from gaident.data.torque_kind import COMMANDED, SAMPLE
 from gaident.errors import RecordError, check_schema
 from gaident.files import write_whole
 from gaident.providers import picture, provided
@@ -44,9 +48,6 @@ CHANNELS = ("command", "velocity", "torque", "position", "position_command")
 
 SCHEMA = "gaident/record"
 SCHEMA_VERSION = 1  # no decision: a format: its version
-
-# A time given as 0.3 s falls on sample 3 of dt = 0.1 s although 0.3 / 0.1 is 2.9999999999999996.
-_TIME_SLACK = 1e-6  # no decision: rounding of two decimal numbers
 
 
 @dataclass(frozen=True, init=False, eq=False, repr=False)
@@ -76,6 +77,8 @@ class Record:
         What the torque is.
         "commanded": as the controller issued it, before the actuator's limits, dead band, delay and lag.
         "measured": a measured current times a constant, behind the actuator, with the sensor's noise on it.
+    torque_log : {"sample", "mean"}
+        What a line contains of it: its value there, or its mean over the controller's samples up to it since the line before.
     notes : sequence of str
         What was noticed and done when the log was read; results repeat it, digest and == do not know it.
 
@@ -83,7 +86,7 @@ class Record:
     ------
     RecordError
         NaN, infinities, unequal lengths, fewer than 20 samples, dt <= 0, arrays that are not one-dimensional real numbers,
-        another `torque_is`, or "measured" without a torque.
+        another `torque_is` or `torque_log`, or "measured" or "mean" without a torque.
 
     Notes
     -----
@@ -110,6 +113,7 @@ class Record:
     position_command: NDArray[np.float64] | None
     name: str
     torque_is: str
+    torque_log: str
     notes: tuple[str, ...]
 
     def __init__(
@@ -123,6 +127,7 @@ class Record:
         *,
         position_command: ArrayLike | None = None,
         torque_is: str = COMMANDED,
+        torque_log: str = SAMPLE,
         notes: Sequence[str] = (),
     ) -> None:
         complete(velocity, command, torque, position_command)
@@ -130,19 +135,22 @@ class Record:
             raise RecordError(f"name={name!r} is no text; give a str")
         given = {key: value for key, value in zip(CHANNELS, (command, velocity, torque, position, position_command), strict=True)}
         channels = {key: None if values is None else channel(values, key) for key, values in given.items()}
-        kind, dt = torque_kind(torque_is, channels["torque"]), sample_time(dt)
-        self._fill(dt, channels, name=str(name), torque_is=kind, notes=(*texts(notes), *unwrapped(equally_long(channels), dt)))
+        kind, line, dt = torque_kind(torque_is, channels["torque"]), torque_line(torque_log, channels["torque"]), sample_time(dt)
+        said = (*texts(notes), *unwrapped(equally_long(channels), dt))
+        self._fill(dt, channels, name=str(name), torque_is=kind, torque_log=line, notes=said)
 
     def _fill(self, dt: float, channels: Mapping[str, NDArray[np.float64] | None], **about: Any) -> None:
         """Set the fields of this frozen object, unchecked."""
         for key, value in {"dt": dt, **channels, **about}.items():
             object.__setattr__(self, key, value)
 
-    def with_channels(self, *, dt: float | None = None, torque_is: str | None = None, **changed: ArrayLike | None) -> Record:
+    def with_channels(
+        self, *, dt: float | None = None, torque_is: str | None = None, torque_log: str | None = None, **changed: ArrayLike | None
+    ) -> Record:
         """Return the record with other channels and all else as it is.
 
         Channels that are not named share memory with this record.
-        A record that has lost its torque is "commanded", as one that never had any.
+        A record that has lost its torque is "commanded" and "sample", as one that never had any.
 
         Parameters
         ----------
@@ -150,6 +158,8 @@ class Record:
             Another sample time [s].
         torque_is : {"commanded", "measured"}, optional
             What another torque is.
+        torque_log : {"sample", "mean"}, optional
+            What a line contains of it.
         **changed : array_like, shape (n,), or None
             Channel -> values, or None to leave the channel out. Where the length changes, give all channels.
 
@@ -175,19 +185,20 @@ class Record:
             one_of(key, "with_channels: the channel", CHANNELS, RecordError)
         old = {key: getattr(self, key) for key in CHANNELS}
         channels = old | {key: None if values is None else channel(values, key) for key, values in changed.items()}
-        if channels["velocity"] is None or all(channels[key] is None for key in ("command", "torque", "position_command")):
-            listed = ", ".join(f"{key}=None" for key, values in changed.items() if values is None)
-            raise RecordError(
-                f"with_channels({listed}) leaves a record without its velocity, or without command and torque; keep what "
-                "the motor did and what drove it"
-            )
+        still_driven(channels, changed)
         made = object.__new__(type(self))
         period = self.dt if dt is None else sample_time(dt)
-        kept = COMMANDED if channels["torque"] is None else self.torque_is
-        kind = kept if torque_is is None else torque_kind(torque_is, channels["torque"])
+        torque = channels["torque"]
+        kept = (COMMANDED, SAMPLE) if torque is None else (self.torque_is, self.torque_log)
+        kind = kept[0] if torque_is is None else torque_kind(torque_is, torque)
+        line = kept[1] if torque_log is None else torque_line(torque_log, torque)
         notes = tuple(dict.fromkeys((*self.notes, *unwrapped(equally_long(channels), period, "position" in changed))))
-        made._fill(period, channels, name=self.name, torque_is=kind, notes=notes)
+        made._fill(period, channels, **self._about | {"torque_is": kind, "torque_log": line, "notes": notes})
         return made
+
+    @property
+    def _about(self) -> dict[str, Any]:
+        return {"name": self.name, "torque_is": self.torque_is, "torque_log": self.torque_log, "notes": self.notes}
 
     def channels(self) -> Iterator[tuple[str, NDArray[np.float64]]]:
         """Yield the channels that are there, as (name, array (n,)), in the order of the arguments."""
@@ -214,12 +225,12 @@ class Record:
 
     @cached_property
     def digest(self) -> str:
-        """SHA-256 of the data, hexadecimal: of the sample time, the channels, and "measured" for such a torque.
+        """SHA-256 of the data, hexadecimal: of the sample time, the channels, "measured" and "mean" for such a torque.
 
         Equal data give equal digests on every machine; the name does not count.
         It gives records an order that does not depend on how they were passed, and reports a fingerprint.
         """
-        return digest_of(self.dt, dict(self.channels()), self.torque_is)
+        return digest_of(self.dt, dict(self.channels()), self.torque_is, self.torque_log)
 
     def __getitem__(self, samples: slice) -> Record:
         """`rec[a:b]`: samples a to b-1, numpy's rules for negative and missing bounds; at least 20 remain."""
@@ -244,7 +255,7 @@ class Record:
             Where a bound is no number, t0 >= t1, or fewer than 20 samples are left.
         """
         check_bounds(t0, t1)
-        start, stop = (self._sample_at(float(value)) for value in (t0, t1))
+        start, stop = (sample_at(float(value), self.dt, len(self)) for value in (t0, t1))
         return self._cut(start, stop, f"between({t0!r}, {t1!r})")
 
     def decimate(self, factor: int) -> Record:
@@ -272,11 +283,8 @@ class Record:
             Where the factor is no whole number >= 1, or fewer than 20 samples are left.
         """
         factor = factor_of(factor, "decimate", "({!r})")
-        count = -(-len(self) // factor)
-        if count < MINIMUM_SAMPLES:
-            raise RecordError(f"decimate({factor}) leaves {count} samples, but at least {MINIMUM_SAMPLES} are needed")
-        kept: Mapping[str, Any] = {key: decimated(values, factor) for key, values in self.channels()}
-        return self.with_channels(dt=self.dt * factor, **kept)
+        kept: Mapping[str, Any] = decimated_channels(dict(self.channels()), factor, self.torque_log)
+        return self.with_channels(dt=self.dt * factor, torque_log=SAMPLE, **kept)
 
     def shifted(self, **samples: int) -> Record:
         """Return the record with channels moved against the others, for a log that wrote them on another line.
@@ -325,10 +333,6 @@ class Record:
         """
         return picture("plot_record", self, axis, units)
 
-    def _sample_at(self, time: float) -> int:
-        """First sample not before `time` [s], within 0..n."""
-        return math.ceil(min(max(time / self.dt - _TIME_SLACK, 0.0), float(len(self))))
-
     def _cut(self, start: int, stop: int, text: str) -> Record:
         count = max(stop - start, 0)
         if count < MINIMUM_SAMPLES:
@@ -338,13 +342,13 @@ class Record:
             )
         part = object.__new__(type(self))
         cut = {key: None if (v := getattr(self, key)) is None else v[start:stop] for key in CHANNELS}
-        part._fill(self.dt, cut, name=self.name, torque_is=self.torque_is, notes=self.notes)
+        part._fill(self.dt, cut, **self._about)
         return part
 
     def to_dict(self) -> dict[str, Any]:
         """Return plain data for JSON: dt, name, torque_is, and the channels as lists, None for those that are not there."""
         channels = {key: None if (v := getattr(self, key)) is None else v.tolist() for key in CHANNELS}
-        about = {"name": self.name, "dt": self.dt, "torque_is": self.torque_is, "notes": list(self.notes)}
+        about = {"dt": self.dt, **self._about, "notes": list(self.notes)}
         return {"schema": SCHEMA, "schema_version": SCHEMA_VERSION, **about, **channels}
 
     @classmethod
@@ -359,12 +363,7 @@ class Record:
             Where the data are something else or of a newer schema.
         """
         check_schema(data, SCHEMA, SCHEMA_VERSION)
-        missing = [key for key in ("dt", "name", *CHANNELS[:4]) if key not in data]  # no decision: a format: its first version
-        if missing:
-            raise RecordError(f"the saved record lacks {', '.join(missing)}; save it again")
-        # Early files contain neither of these, nor a position command.
-        kind, notes = data.get("torque_is", COMMANDED), data.get("notes", ())
-        return cls(data["dt"], name=data["name"], torque_is=kind, notes=notes, **{key: data.get(key) for key in CHANNELS})
+        return cls(**saved_fields(data, CHANNELS))
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write the record as JSON, all digits, for `gaident.load`; the file appears whole or not at all."""
@@ -374,17 +373,18 @@ class Record:
         """Same sample time, same name, same channels, same values, a torque of the same kind."""
         if not isinstance(other, Record):
             return NotImplemented
-        if (self.dt, self.name, self.torque_is, len(self)) != (other.dt, other.name, other.torque_is, len(other)):
-            return False
-        mine, yours = dict(self.channels()), dict(other.channels())
-        return mine.keys() == yours.keys() and all(np.array_equal(mine[key], yours[key]) for key in mine)
+        mine, yours = ({"dt": r.dt, **r._about, "notes": ()} for r in (self, other))
+        theirs = dict(other.channels())
+        same = mine == yours and len(self) == len(other) and dict(self.channels()).keys() == theirs.keys()
+        return same and all(np.array_equal(values, theirs[key]) for key, values in self.channels())
 
     def __hash__(self) -> int:
         return hash((self.digest, self.name))
 
     def __repr__(self) -> str:
         label = f"{self.name!r}, " if self.name else ""
-        kind = {"torque": " (measured)"} if self.torque_is == MEASURED else {}
+        said = [word for word in (self.torque_is, self.torque_log) if word not in (COMMANDED, SAMPLE)]
+        kind = {"torque": f" ({', '.join(said)})"} if said else {}
         channels = ", ".join(f"{key} {v.min() + 0.0:.4g}..{v.max() + 0.0:.4g}{kind.get(key, '')}" for key, v in self.channels())
         return f"Record({label}{len(self)} samples, dt={self.dt:.6g} s, {self.duration:.4g} s; {channels})"
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import math
 from collections.abc import Mapping, Sequence
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,23 +14,31 @@ from gaident.arguments import arg
 from gaident.axis import Text
 from gaident.checks import one_of
 from gaident.data.signals.arrays import MINIMUM_SAMPLES, channel, positive_number
+from gaident.data.signals.decimation import decimated
 from gaident.data.signals.wraps import continued, wrapped_words
-from gaident.data.torque_kind import COMMANDED, TORQUE_KINDS
+from gaident.data.torque_kind import COMMANDED, MEAN, SAMPLE, TORQUE_KINDS, TORQUE_LOGS
 from gaident.errors import RecordError
 
 __all__ = [
     "check_bounds",
     "complete",
+    "decimated_channels",
     "digest_of",
     "equally_long",
     "moved_channels",
+    "saved_fields",
+    "sample_at",
     "sample_time",
     "slice_bounds",
+    "still_driven",
     "texts",
     "torque_kind",
+    "torque_line",
     "unwrapped",
 ]
 
+# A time given as 0.3 s falls on sample 3 of dt = 0.1 s although 0.3 / 0.1 is 2.9999999999999996.
+TIME_SLACK = 1e-6  # no decision: rounding of two decimal numbers
 HASH_BLOCK = 1 << 18  # no decision: memory; values of a block
 
 
@@ -44,6 +53,14 @@ def torque_kind(torque_is: object, torque: NDArray[np.float64] | None) -> str:
     if kind != COMMANDED and torque is None:
         raise RecordError(f"torque_is={kind!r}, but the record has no torque; give torque=, or leave torque_is out")
     return kind
+
+
+def torque_line(torque_log: object, torque: NDArray[np.float64] | None) -> str:
+    """What a line contains of the torque, once it is one of the two and there is a torque. Raises RecordError."""
+    line = one_of(torque_log, "torque_log", TORQUE_LOGS, RecordError)
+    if line != SAMPLE and torque is None:
+        raise RecordError(f"torque_log={line!r}, but the record has no torque; give torque=, or leave torque_log out")
+    return line
 
 
 def equally_long(channels: dict[str, NDArray[np.float64] | None]) -> dict[str, NDArray[np.float64] | None]:
@@ -148,7 +165,50 @@ def slice_bounds(samples: object, length: int) -> tuple[int, int, str]:
     return start, stop, text
 
 
-def digest_of(dt: float, channels: Mapping[str, NDArray[np.float64]], torque_is: str) -> str:
+def sample_at(time: float, dt: float, n: int) -> int:
+    """First of n samples not before `time` [s], within 0..n."""
+    return math.ceil(min(max(time / dt - TIME_SLACK, 0.0), float(n)))
+
+
+def still_driven(channels: Mapping[str, object], changed: Mapping[str, object]) -> None:
+    """Raise RecordError where changed channels leave a record without its velocity, or without what drove it."""
+    if channels["velocity"] is None or all(channels[key] is None for key in ("command", "torque", "position_command")):
+        listed = ", ".join(f"{key}=None" for key, values in changed.items() if values is None)
+        raise RecordError(
+            f"with_channels({listed}) leaves a record without its velocity, or without command and torque; keep what "
+            "the motor did and what drove it"
+        )
+
+
+def decimated_channels(
+    channels: Mapping[str, NDArray[np.float64]], factor: int, torque_log: str
+) -> dict[str, NDArray[np.float64]]:
+    """Every `factor`-th sample behind a low-pass, see `Record.decimate`. Raises RecordError where too few are left.
+
+    A torque that is a mean since the line before is half a line old; the mean of two neighbours is that at the line.
+    """
+    count = -(-len(channels["velocity"]) // factor)
+    if count < MINIMUM_SAMPLES:
+        raise RecordError(f"decimate({factor}) leaves {count} samples, but at least {MINIMUM_SAMPLES} are needed")
+    made = dict(channels)
+    if torque_log == MEAN:
+        u = channels["torque"]
+        made["torque"] = np.append(0.5 * (u[1:] + u[:-1]), u[-1])  # no decision: a formula: a mean of two
+    return {key: decimated(values, factor) for key, values in made.items()}
+
+
+def saved_fields(data: Mapping[str, Any], channels: Sequence[str]) -> dict[str, Any]:
+    """What the constructor takes, of a saved record with these channels. Raises RecordError where a key is missing."""
+    first = ("dt", "name", *channels[:4])  # no decision: a format: its first version
+    missing = [key for key in first if key not in data]
+    if missing:
+        raise RecordError(f"the saved record lacks {', '.join(missing)}; save it again")
+    # Early files contain none of these, nor a position command.
+    later = {"torque_is": COMMANDED, "torque_log": SAMPLE, "notes": (), "position_command": None}
+    return {key: data[key] for key in first} | {k: data.get(k, default) for k, default in later.items()}
+
+
+def digest_of(dt: float, channels: Mapping[str, NDArray[np.float64]], torque_is: str, torque_log: str) -> str:
     """SHA-256 of the data of a record, see `Record.digest`."""
     sha = hashlib.sha256(f"gaident record 1 {dt.hex()} {len(channels['velocity'])}".encode())
     for key, values in channels.items():
@@ -159,4 +219,6 @@ def digest_of(dt: float, channels: Mapping[str, NDArray[np.float64]], torque_is:
             sha.update(block.astype("<f8", copy=False).tobytes())
     if torque_is != COMMANDED:
         sha.update(f" torque is {torque_is}".encode())
+    if torque_log != SAMPLE:
+        sha.update(f" torque log {torque_log}".encode())
     return sha.hexdigest()

@@ -8,11 +8,14 @@ from itertools import pairwise
 
 from gaident.data.column_words import COMMAND_WORDS, FOREIGN_WORDS, MEASURED_WORDS, QUANTITY_WORDS, words_of
 
-__all__ = ["COMMANDED", "MEASURED", "TORQUE_KINDS", "kind_of_torque", "kind_of_column"]
+__all__ = ["COMMANDED", "MEAN", "MEASURED", "SAMPLE", "TORQUE_KINDS", "TORQUE_LOGS", "kind_of_torque", "kind_of_column"]
 
 COMMANDED, MEASURED = "commanded", "measured"
 TORQUE_KINDS = (COMMANDED, MEASURED)
 """What a logged torque may be: the controller's command, or a measured current times a constant."""
+SAMPLE, MEAN = "sample", "mean"
+TORQUE_LOGS = (SAMPLE, MEAN)
+"""What a line of the log contains of it: its value there, or its mean since the line before."""
 
 _BEHIND_ACTUATOR = (MEASURED_WORDS - {"motor", "servo", "real", "est", "estimate", "estimated"}) | {"sensor"}
 _QUADRATURE = frozenset({"iq", "isq"})  # a drive's name for the torque-forming current that its transducers see

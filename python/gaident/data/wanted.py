@@ -14,7 +14,7 @@ from gaident.data.formats.units import QUANTITIES, Constants, factor, is_any_uni
 from gaident.data.record import CHANNELS
 from gaident.data.signals.arrays import positive_number
 from gaident.data.signals.decimation import factor_of
-from gaident.data.torque_kind import TORQUE_KINDS
+from gaident.data.torque_kind import SAMPLE, TORQUE_KINDS, TORQUE_LOGS
 from gaident.errors import ReadError
 
 __all__ = ["Wanted", "si_factor", "wanted_of"]
@@ -36,6 +36,7 @@ class Wanted:
     load_side: tuple[str, ...] = ()
     measured: bool = True
     torque_is: str | None = None
+    torque_log: str = SAMPLE
     shift: Mapping[str, int] = field(default_factory=dict)
 
     def check(self) -> Wanted:
@@ -59,6 +60,7 @@ class Wanted:
         self._check_gear()
         if self.torque_is is not None:
             one_of(self.torque_is, "torque_is", TORQUE_KINDS, ReadError)
+        one_of(self.torque_log, "torque_log", TORQUE_LOGS, ReadError)
         self._check_shift()
         if self.name is not None and not isinstance(self.name, str):
             raise ReadError(f"name={self.name!r} is no text; give a str")

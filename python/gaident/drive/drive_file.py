@@ -46,6 +46,7 @@ KEYS: dict[str, dict[str, kinds.Check]] = {
         "gear_ratio": kinds.positive,
         "load_side": kinds.channels,
         "torque_is": kinds.torque_is,
+        "torque_log": kinds.torque_log,
         "decimate": kinds.whole,
         "resample": kinds.positive,
         "from": kinds.number,
@@ -126,7 +127,8 @@ class Drive:
             )
         columns = {k: None if v == "" else v for k, v in self.columns.items()}
         left_out = {k for k, v in columns.items() if v is None}
-        not_read = {"axis", "pitch", "dt", "from", "to", "pieces"} | ({"torque_is"} if "torque" in left_out else set())
+        of_torque = {"torque_is", "torque_log"} if "torque" in left_out else set()
+        not_read = {"axis", "pitch", "dt", "from", "to", "pieces"} | of_torque
         more = {k: v for k, v in self.general.items() if k not in not_read}
         asked = [k for k in (*CHANNELS, *([] if "dt" in self.general else ["time"])) if k not in left_out]
         self._refuse_unfilled("units", asked, "or give it with --units CHANNEL=UNIT")

@@ -8,12 +8,12 @@ from gaident.axis import AXES
 from gaident.checks import one_of, real_number
 from gaident.data.formats.units import factor, of_other_axis
 from gaident.data.record import CHANNELS
-from gaident.data.torque_kind import TORQUE_KINDS
+from gaident.data.torque_kind import TORQUE_KINDS, TORQUE_LOGS
 from gaident.errors import ReadError
 
 __all__ = [
     *("Check", "axis", "channels", "column", "length", "number", "pair", "pair_or_one", "positive", "text"),
-    *("torque_is", "unit", "whole", "yes_or_no"),
+    *("torque_is", "torque_log", "unit", "whole", "yes_or_no"),
 ]
 
 Check = Callable[[object, str], object]
@@ -101,3 +101,7 @@ def axis(value: object, name: str) -> str:
 
 def torque_is(value: object, name: str) -> str:
     return one_of(value, name, TORQUE_KINDS, ReadError)
+
+
+def torque_log(value: object, name: str) -> str:
+    return one_of(value, name, TORQUE_LOGS, ReadError)

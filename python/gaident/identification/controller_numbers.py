@@ -33,7 +33,7 @@ from gaident.errors import ControllerError, RecordError
 from gaident.estimation.criterion import effective_samples, gained
 from gaident.identification import number_words
 from gaident.identification.logged_stretches import centred, correlation, log_of, numbered, unlimited, whitened
-from gaident.identification.number_ranges import SMALLEST, grid_of, inverse, off_bound, range_of
+from gaident.identification.number_ranges import SMALLEST, grid_of, inverse, off_bound, range_of, slopes
 from gaident.policy.table import POLICY
 from gaident.results.estimate import Estimate
 
@@ -46,7 +46,6 @@ BOUNDED = ("kp", "ki", "command_weight")  # no controller has one below 0
 GAINS = (*BOUNDED, "acceleration_feedforward", "friction_feedforward")
 """Linear in the torque; the others are searched by their logarithm, but a numerator's damping and a share."""
 LOGARITHMIC = ("gain", "time_constant", "frequency", "denominator_damping")
-SLOPE_STEP = 1e-5  # no decision: the step of a difference, of a number
 DEVIATION_ROUNDING = 1e-12  # no decision: of the torque's deviation, what a sum is exact to
 
 
@@ -271,9 +270,13 @@ class _Fit:
         return cascade if self.whole else replace(cascade, velocity=unlimited(cascade.velocity))
 
     def left(self, x: Vector, straight: bool = False) -> Vector:
-        """Logged minus made torque [N m] at every line; straight: the velocity goes straight between the lines."""
+        """Logged minus made torque [N m] at every line; straight: the velocity goes straight between the lines.
+
+        In a log of means the torque shows how the velocity turns between the lines, where the command jumps.
+        """
         cascade = self.controller(x)
-        left: Vector = self.logged - np.concatenate([log.made(cascade, straight) for log in self.logs])
+        logs = [log.pushed(cascade) if log.mean else log for log in self.logs]
+        left: Vector = self.logged - np.concatenate([log.made(cascade, straight) for log in logs])
         return left
 
     def free(self, rho: float, straight: bool = False) -> Callable[[Vector], Vector]:
@@ -347,20 +350,10 @@ class _Fit:
             started[self.fields.index("kp")] = 1e-3 * float(np.std(self.logged))  # no decision: a start
         return started
 
-    def slopes(self, off: Callable[[Vector], Vector], x: Vector, low: Vector) -> Matrix:
-        """(lines, numbers): how `off` changes with each number."""
-        slopes = []
-        for k in range(len(x)):
-            moved = SLOPE_STEP * max(abs(float(x[k])), SLOPE_STEP) * np.eye(len(x))[k]
-            up, down = x + moved, x - moved if x[k] - moved[k] >= low[k] else x
-            slopes.append((off(up) - off(down)) / (up[k] - down[k]))
-        table: Matrix = np.array(slopes).T
-        return table
-
     def _judged(self, x: Vector, rho: float, low: Vector, high: Vector) -> _Solved:
         off = self.free(rho)
         at = off(x)
-        J = self.slopes(off, x, low)
+        J = slopes(off, x, low)
         count = int(len(at) - len(x) - len(np.unique(self.stretch[self.used])))
         free_left = self.free(0.0)(x)
         size = float(np.std(self.logged[self.used]))
@@ -368,7 +361,7 @@ class _Fit:
         spread, back = inverse(J)
         # Where linear interpolation of the velocity, or another correlation, would have put the numbers.
         linear = back @ (self.free(rho, straight=True)(x) - at)
-        uncorrelated = inverse(self.slopes(self.free(0.0), x, low))[1] @ free_left
+        uncorrelated = inverse(slopes(self.free(0.0), x, low))[1] @ free_left
         covariance = sigma**2 * spread + np.outer(linear, linear) + np.outer(uncorrelated, uncorrelated)
         stds, values = np.sqrt(np.diag(covariance)), self.values(x)
         units = np.array([v if f in LOGARITHMIC else 1.0 for v, f in zip(values, self.fields, strict=True)])

@@ -14,11 +14,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gaident.control import core
-from gaident.control.between import at_the_clock, between_lines
+from gaident.control.between import at_lines, at_the_clock, between_lines
 from gaident.control.cascade import Cascade
 from gaident.control.pi import PI
 from gaident.control.ticks import push_of, smooth_between
 from gaident.data.record import Record
+from gaident.data.torque_kind import MEAN
 from gaident.models.made_torque import stored_beside
 from gaident.models.starts import starts_moving
 from gaident.policy.table import POLICY
@@ -33,7 +34,7 @@ class Log:
     """Lines of a record; velocity: at the controller's samples. stretch (n,): number of the line's stretch; -1: none.
 
     moving: it starts in motion, and what the integrator stored before is not known. between: the command at the controller's
-    samples (n, r) where it is known there, see `Controller.source_of`; else `source`.
+    samples (n, r) where it is known there, see `Controller.source_of`; else `source`. mean: of means since the line before.
     """
 
     dt: float
@@ -44,6 +45,7 @@ class Log:
     stretch: NDArray[np.intp]
     between: Vector
     moving: bool = False
+    mean: bool = False
 
     @property
     def command(self) -> Vector:
@@ -52,7 +54,7 @@ class Log:
         return between_lines(self.source, every) if self.between.ndim == 1 else self.between.ravel()
 
     def made(self, cascade: Cascade, straight: bool = False) -> Vector:
-        """What the controller makes at the lines of the log [N m] (n,); straight: of a velocity straight between the lines.
+        """What the lines contain of what the controller makes [N m] (n,); straight: of a velocity straight between the lines.
 
         Of a record that begins under load, with what the torque shows that the integrator stored.
         """
@@ -60,10 +62,10 @@ class Log:
         velocity = at_the_clock(self.velocity[::every], every) if straight else self.velocity
         ticks = cascade.ticks(self.dt, self.between, self.position)
         loop = cascade.core_loop(self.dt)
-        torque = core.servo_torque(self.dt, ticks, velocity, loop)[::every]
+        torque = at_lines(core.servo_torque(self.dt, ticks, velocity, loop), every, self.mean)
         if self.moving or not (stored := stored_beside(self.torque, torque, cascade)):
             return torque
-        return core.servo_torque(self.dt, ticks, velocity, loop, stored)[::every]
+        return at_lines(core.servo_torque(self.dt, ticks, velocity, loop, stored), every, self.mean, stored)
 
     def pushed(self, cascade: Cascade) -> Log:
         """The log with a velocity between the lines whose slope jumps where the command does, see `pushed_between`."""
@@ -88,7 +90,10 @@ def log_of(rec: Record, share: int, cascade: Cascade, whole: bool) -> Log:
     assert source is not None and between is not None and part.torque is not None
     size = np.abs(part.torque)
     limit = cascade.velocity.torque_limit or plateau_of(size)
+    mean = part.torque_log == MEAN and every > 1
     free = size < POLICY.at_limit * limit if not whole else np.ones(len(size), bool)
+    if mean:  # a line beside a limited one is the mean of limited samples, too
+        free = free & np.append(True, free[:-1]) & np.append(free[1:], True)
     begins = free & ~np.append(False, free[:-1])
     stretch = np.where(free, np.cumsum(begins) - 1, -1)
     stretch[len(stretch) - cascade.ahead(rec.dt) :] = -1
@@ -98,7 +103,7 @@ def log_of(rec: Record, share: int, cascade: Cascade, whole: bool) -> Log:
         stretch[: min(POLICY.filter_memory // 4, len(stretch) // 4)] = -1
     velocity = smooth_between(part.velocity, every)
     position = part.position if cascade.position is not None else None
-    return Log(rec.dt, source, velocity, position, part.torque, stretch, between, moving)
+    return Log(rec.dt, source, velocity, position, part.torque, stretch, between, moving, mean)
 
 
 def plateau_of(size: Vector) -> float:

@@ -2,18 +2,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 from numpy.typing import NDArray
 
 from gaident.policy.table import POLICY
 
-__all__ = ["FREQUENCIES", "SMALLEST", "TIME_CONSTANTS", "grid_of", "inverse", "off_bound", "range_of"]
+__all__ = ["FREQUENCIES", "SMALLEST", "TIME_CONSTANTS", "grid_of", "inverse", "off_bound", "range_of", "slopes"]
 
 Vector = NDArray[np.float64]
 Matrix = NDArray[np.float64]
 
 SMALLEST = 1e-300  # no decision: no division by 0, and a controller of two gains of 0 is none
 TIME_CONSTANTS = np.geomspace(0.3, 100.0, POLICY.grid)  # no decision: a start; controller periods
+SLOPE_STEP = 1e-5  # no decision: the step of a difference, of a number
 FREQUENCIES = np.geomspace(2e-3, 0.4, POLICY.notches)  # no decision: a start; of the controller's sampling frequency
 
 
@@ -70,3 +73,14 @@ def off_bound(x: Vector, low: Vector, high: Vector) -> Vector:
     """A start strictly inside of its bounds."""
     margin = np.maximum(np.abs(x), 1.0) * 1e-12  # no decision: rounding
     return np.clip(x, np.where(np.isfinite(low), low + margin, low), np.where(np.isfinite(high), high - margin, high))
+
+
+def slopes(off: Callable[[Vector], Vector], x: Vector, low: Vector) -> Matrix:
+    """(lines, numbers): how `off` changes with each number."""
+    columns = []
+    for k in range(len(x)):
+        moved = SLOPE_STEP * max(abs(float(x[k])), SLOPE_STEP) * np.eye(len(x))[k]
+        up, down = x + moved, x - moved if x[k] - moved[k] >= low[k] else x
+        columns.append((off(up) - off(down)) / (up[k] - down[k]))
+    table: Matrix = np.array(columns).T
+    return table

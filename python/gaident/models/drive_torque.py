@@ -8,12 +8,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gaident.arguments import TORQUE
-from gaident.control.between import at_the_clock
+from gaident.control.between import at_lines, at_the_clock
 from gaident.control.controller import Controller
 from gaident.control.pi import PI
 from gaident.control.pi_torque import pi_block
 from gaident.data.record import Record
 from gaident.data.signals.difference import is_backward_difference
+from gaident.data.torque_kind import MEAN, SAMPLE
 from gaident.errors import RecordError
 from gaident.models.made_torque import late, made_at_its_clock, stored_torque
 from gaident.models.starts import starts_moving
@@ -29,6 +30,7 @@ __all__ = [
 ]
 
 Vector = NDArray[np.float64]
+Matrix = NDArray[np.float64]
 
 TWO_MASSES = 3  # no decision: how many poles two masses have
 HALF = 0.5  # no decision: of a sample, the age of a mean over it
@@ -40,6 +42,7 @@ def driven_by(rec: Record, controller: Controller) -> Record:
     Where the log has a line for each of the controller's samples, that is the logged torque, or the one that the controller
     makes of the measured signals.
     Of a torque logged every r-th sample, it is the mean over its r samples between the lines, see `_at_its_clock`.
+    A log of means has it but for the first of these samples, see `_mean_ahead`.
 
     A known delay of the controller is part of it: `late`. Raises RecordError where a torque is neither logged nor can be made.
     """
@@ -48,10 +51,10 @@ def driven_by(rec: Record, controller: Controller) -> Record:
     whole = rec.with_channels(torque=torque)
     stored = stored_torque(whole, controller, driven=False)
     before = torque[0] if starts_moving(whole, None) else stored
-    if every == 1:
-        return rec.with_channels(torque=late(torque, controller.delay / rec.dt, before))
-    mean = _at_its_clock(rec, torque, controller, stored).reshape(len(rec), every).mean(axis=1)
-    return rec.with_channels(torque=late(mean, controller.delay / rec.dt, before))
+    if every > 1:
+        at_clock = _at_its_clock(rec, torque, controller, stored).reshape(len(rec), every)
+        torque = _mean_ahead(torque, at_clock) if rec.torque_log == MEAN else at_clock.mean(axis=1)
+    return rec.with_channels(torque=late(torque, controller.delay / rec.dt, before), torque_log=SAMPLE)
 
 
 def straight_driven(rec: Record, controller: Controller) -> Record:
@@ -62,8 +65,33 @@ def straight_driven(rec: Record, controller: Controller) -> Record:
     assert rec.torque is not None
     every = controller.log_every(rec.dt)
     before = rec.torque[0] if starts_moving(rec, None) else 0.0
-    mean = at_the_clock(rec.torque, every).reshape(len(rec), every).mean(axis=1)
-    return rec.with_channels(torque=late(mean, controller.delay / rec.dt, before))
+    straight = _straight(rec, rec.torque, every).reshape(len(rec), every)
+    mean = _mean_ahead(rec.torque, straight) if rec.torque_log == MEAN else straight.mean(axis=1)
+    return rec.with_channels(torque=late(mean, controller.delay / rec.dt, before), torque_log=SAMPLE)
+
+
+def _mean_ahead(logged: Vector, at_clock: Matrix) -> Vector:
+    """The mean over each line [N m] (n,), of a log of means since the line before and the torque at the samples (n, r):
+
+    m(k+1) = (u(k r + 1) + ... + u(k r + r))/r,   mean over line k = m(k+1) + (u(k r) - u(k r + r))/r
+    """
+    at_line = at_clock[:, 0]
+    mean: Vector = np.append(logged[1:] + (at_line[:-1] - at_line[1:]) / at_clock.shape[1], at_clock[-1].mean())
+    return mean
+
+
+def _straight(rec: Record, line: Vector, every: int) -> Vector:
+    """A signal that the log has as it has the torque (n,), straight from line to line at the controller's samples (n r,).
+
+    A mean over r samples is that of their middle, (r - 1)/2 samples before its line.
+    """
+    if rec.torque_log != MEAN:
+        return at_the_clock(line, every)
+    middle = np.arange(len(line)) * every - 0.5 * (every - 1)  # no decision: a formula: the middle of r samples
+    at = np.arange(len(line) * every, dtype=np.float64)
+    slope = (line[-1] - line[-2]) / every
+    made: Vector = np.interp(at, middle, line) + slope * np.maximum(at - middle[-1], 0.0)
+    return made
 
 
 def _at_its_clock(rec: Record, torque: Vector, controller: Controller, stored: float) -> Vector:
@@ -76,11 +104,11 @@ def _at_its_clock(rec: Record, torque: Vector, controller: Controller, stored: f
     every = controller.log_every(rec.dt)
     made = made_at_its_clock(rec, controller, stored)
     if made is not None:
-        off = torque - made[::every]
+        off = torque - at_lines(made, every, rec.torque_log == MEAN, stored)
         if np.sum(np.diff(off) ** 2) < np.sum(np.diff(torque) ** 2):
-            between: Vector = made + at_the_clock(off, every)
+            between: Vector = made + _straight(rec, off, every)
             return between
-    return at_the_clock(torque, every)
+    return _straight(rec, torque, every)
 
 
 def as_old_as_its_velocity(rec: Record) -> Record:

@@ -1,4 +1,7 @@
-"""What is held over a line of the log: a commanded torque as it stands, a sampled one as its mean there."""
+"""What is held over a line of the log: a commanded torque as it stands, a sampled one as its mean there.
+
+A log of means has that mean in its next line.
+"""
 
 from __future__ import annotations
 
@@ -6,17 +9,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gaident.data.record import Record
-from gaident.data.torque_kind import COMMANDED, MEASURED
+from gaident.data.torque_kind import COMMANDED, MEAN, MEASURED, SAMPLE
 from gaident.policy.table import POLICY
 
-__all__ = ["held_torque", "kind_of_held", "sampled_between"]
+__all__ = ["held_mean", "held_torque", "kind_of_held", "sampled_between"]
 
 Signal = NDArray[np.float64]
 
 
 def sampled_between(rec: Record) -> bool:
     """Whether the torque is a sample, at each line, of one that changes between the lines: no drive holds it that long."""
-    return rec.torque_is == MEASURED and rec.dt > POLICY.longest_hold
+    return rec.torque_is == MEASURED and rec.torque_log != MEAN and rec.dt > POLICY.longest_hold
 
 
 def kind_of_held(rec: Record, dt: float) -> str:
@@ -28,9 +31,19 @@ def held_torque(rec: Record) -> Signal:
     """What a simulation holds over each line of the log [N m] (n,): the logged torque or, of a sampled one, its mean there.
 
         u_h(n) = (u(n) + u(n+1))/2        a torque that goes straight from line to line; the last line is held
+        u_h(n) = u(n+1)                   a log of means since the line before
 
     Held from its line on, a sampled torque would be half a line late.
     """
     assert rec.torque is not None
     u = np.ascontiguousarray(rec.torque, dtype=np.float64)
+    if rec.torque_log == MEAN:
+        return np.append(u[1:], u[-1])
     return np.append(0.5 * (u[1:] + u[:-1]), u[-1]) if sampled_between(rec) else u  # no decision: a formula: a mean of two
+
+
+def held_mean(rec: Record) -> Record:
+    """The record with the torque that is held over each line in place of a mean since the line before."""
+    if rec.torque is None or rec.torque_log != MEAN:
+        return rec
+    return rec.with_channels(torque=held_torque(rec), torque_is=kind_of_held(rec, rec.dt), torque_log=SAMPLE)

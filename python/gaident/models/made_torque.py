@@ -28,11 +28,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gaident.control import core
+from gaident.control.between import at_lines
 from gaident.control.controller import Controller
 from gaident.control.pi import bare_pi
 from gaident.control.pi_torque import pi_torque
 from gaident.control.ticks import pushed_between
 from gaident.data.record import Record
+from gaident.data.torque_kind import MEAN
 from gaident.models.starts import constant_beside
 from gaident.policy.table import POLICY
 
@@ -46,7 +48,7 @@ PARTS = 20  # no decision: of a record, the longer of the two spans; from 5 to 8
 def stored_torque(rec: Record, controller: Controller, driven: bool = True) -> float:
     """What the integrator stored before a record [N m], for a load; 0 where nothing shows it.
 
-    driven: whether the torque is as `driven_by` makes it, the mean over each line; else it is the controller's at each line.
+    driven: whether the torque is as `driven_by` makes it, the mean over each line; else it is the controller's as the log has it.
     """
     made = _from_rest(rec, controller, driven)
     return 0.0 if rec.torque is None or made is None else stored_beside(rec.torque, made, controller)
@@ -82,8 +84,9 @@ def _from_rest(rec: Record, controller: Controller, driven: bool) -> Vector | No
     made = made_at_its_clock(rec, controller)
     if made is None:
         return None
-    lines = made.reshape(len(rec), -1)
-    return late(lines.mean(axis=1), controller.delay / rec.dt, 0.0) if driven else lines[:, 0]
+    if not driven:
+        return at_lines(made, len(made) // len(rec), rec.torque_log == MEAN)
+    return late(made.reshape(len(rec), -1).mean(axis=1), controller.delay / rec.dt, 0.0)
 
 
 def made_at_its_clock(rec: Record, controller: Controller, stored: float = 0.0) -> Vector | None:

@@ -16,6 +16,7 @@ from gaident.control.between import Unsure, jumps_between, unsure_between
 from gaident.control.pi import PI
 from gaident.control.ticks import pushed_between
 from gaident.data.record import Record
+from gaident.data.torque_kind import MEAN
 from gaident.diagnosis.controller.form_regression import Law, Place, Shape, fitted_shape, grid_of, solved_shape
 from gaident.diagnosis.controller.lost_times import LostTimes
 from gaident.identification.replay.line_steps import LineSteps
@@ -32,8 +33,11 @@ FOLLOWED = 2  # no decision: of a solver: so many of a grid's best starts are fo
 
 
 def jumps_of(records: Sequence[Record], every: int) -> Unsure | None:
-    """What the lines of all records, one after the other, do not tell of their commands; None where that is no jump, or known."""
-    if every == 1 or any(r.command is None or isinstance(r, TimedRecord) for r in records):
+    """What the lines of all records, one after the other, do not tell of their commands; None where that is no jump, or known.
+
+    None also for a log of means: its jumps are taken to fall on the lines.
+    """
+    if every == 1 or any(r.command is None or isinstance(r, TimedRecord) or r.torque_log == MEAN for r in records):
         return None
     commands = [r.command for r in records if r.command is not None]
     if not any(len(jumps_between(c)) for c in commands):

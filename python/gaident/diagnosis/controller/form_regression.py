@@ -17,7 +17,7 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from gaident.control.between import at_the_clock
+from gaident.control.between import at_lines, at_the_clock
 from gaident.control.cascade import Cascade, Filter
 from gaident.control.filtering import filtered
 from gaident.control.filters import LowPass, Notch
@@ -81,6 +81,7 @@ class Law:
     velocities: others that have the same lines [rad/s] (n r,) each; () where the log has all samples.
     straight: the velocity straight between its lines [rad/s] (n r,).
     steps: that the velocities of each record are rounded to [rad/s], where r = 1.
+    mean: whether the torque is of means since the line before.
     lost: where the lines do not tell when the command jumped: steps of the signals are fitted, see `lost_times`.
     """
 
@@ -97,6 +98,7 @@ class Law:
     straight: Vector | None = None
     steps: tuple[float, ...] = ()
     lost: LostTimes | None = None
+    mean: bool = False
 
     @property
     def others(self) -> tuple[Law, ...]:
@@ -124,7 +126,7 @@ class Law:
         for b, a in torque:
             rows = filtered(b, a, rows, ticks)
         starts = np.repeat(np.eye(len(self.lengths)), self.lengths, axis=1)
-        return self._fitted(np.concatenate([rows[:, :: self.every], starts]))
+        return self._fitted(np.concatenate([at_lines(rows, self.every, self.mean), starts]))
 
     @property
     def logged(self) -> Vector:
@@ -198,12 +200,13 @@ def law_of(records: Sequence[Record], given: PI, every: int = 1, steps: tuple[fl
     else:
         cascade = Cascade(given, period)
         logs = [log_of(r, share, cascade, False) for r in records]
+        logs = [log.pushed(cascade) if log.mean else log for log in logs]  # the torque shows how the velocity turns at a jump
         stretch = numbered([log.stretch for log in logs])
         command = np.concatenate([log.command for log in logs])
         smooth = np.concatenate([log.velocity for log in logs])
         straight = np.concatenate([at_the_clock(log.velocity[::every], every) for log in logs])
         used = stretch >= 0
-        law = Law(command, smooth, torque, used, lengths, period, every, stretch, straight=straight)
+        law = Law(command, smooth, torque, used, lengths, period, every, stretch, straight=straight, mean=logs[0].mean)
         coefficients = np.array([given.kp, given.kp, given.ki, *np.zeros(2 + len(records))])
         off, own = law.of_other(replace(law, velocity=straight), coefficients)
         law = replace(law, rho=correlation_of(off, own))

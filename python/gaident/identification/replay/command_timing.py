@@ -36,7 +36,7 @@ from gaident.control.between import Unsure, unsure_between
 from gaident.control.cascade import Cascade, cascade_of
 from gaident.control.controller import Controller
 from gaident.data.record import Record
-from gaident.data.torque_kind import COMMANDED
+from gaident.data.torque_kind import COMMANDED, MEAN
 from gaident.identification.logged_stretches import Log, log_of, unlimited
 from gaident.identification.logged_torque import comparable, not_followed
 from gaident.identification.noise import Autoregression
@@ -62,8 +62,8 @@ def timed(records: Sequence[Record], controller: Controller | None) -> tuple[Rec
     """The records, those that know when their command changed between their lines as `TimedRecord`.
 
     They know it where the log is slower than its controller, that is driven by a velocity command and known, and a commanded
-    torque is logged from rest, which then follows from this controller: one that is not the drive's, or another limit, is no
-    time.
+    torque, no mean, is logged from rest.
+    It then follows from this controller: one that is not the drive's, or another limit, is no time.
     A record that is timed already is timed anew.
     """
     plain = tuple(plain_of(rec) for rec in records)
@@ -74,7 +74,8 @@ def timed(records: Sequence[Record], controller: Controller | None) -> tuple[Rec
 
 def _timed(rec: Record, controller: Controller) -> Record:
     every = controller.log_every(rec.dt)
-    if every == 1 or rec.command is None or rec.torque_is != COMMANDED or not comparable(rec, controller):
+    sampled = rec.torque_is == COMMANDED and rec.torque_log != MEAN
+    if every == 1 or rec.command is None or not sampled or not comparable(rec, controller):
         return rec
     unsure = unsure_between(rec.command, every)
     timing = _Timing.of(rec, cascade_of(controller), unsure)

@@ -12,9 +12,16 @@ from gaident.control.beside import beside_pi
 from gaident.control.controller import Controller
 from gaident.control.pi import PI, bare_pi
 from gaident.data.record import Record
+from gaident.data.torque_kind import MEAN, SAMPLE
 from gaident.models.drive_torque import driven_by
+from gaident.models.held_torque import held_mean
 from gaident.models.made_torque import stored_torque
 from gaident.policy.table import POLICY
+
+MEAN_OF_ONE = say(
+    "Each {torque} of the log is a mean over samples of the controller, which by its sample time has one for each line: the "
+    "mean is taken for a sample. Give the controller's sample time: Cascade(PI(...), period=...)."
+)
 
 __all__ = ["Driven", "follows_not", "torque_driven"]
 
@@ -40,8 +47,11 @@ class Driven(NamedTuple):
 
 def torque_driven(records: Sequence[Record], controller: Controller | None) -> Driven:
     """The records as they are under a bare PI or in the open loop; under any other controller as driven by their torque."""
-    if controller is None or controller.one_equation:
-        return Driven(tuple(records), controller)
+    if controller is None:
+        return Driven(tuple(held_mean(r) for r in records), None)
+    if controller.one_equation:
+        means = any(r.torque_log == MEAN for r in records)
+        return Driven(tuple(r.with_channels(torque_log=SAMPLE) for r in records), controller, (MEAN_OF_ONE,) * means)
     every = max(controller.log_every(r.dt) for r in records)
     if every == 1:
         has = beside_pi(controller)

@@ -28,9 +28,8 @@ class TimedRecord(Record):
         """The record with this command between its lines."""
         made = object.__new__(cls)
         channels = {key: getattr(rec, key) for key in CHANNELS}
-        about = {"name": rec.name, "torque_is": rec.torque_is, "notes": rec.notes}
         between.setflags(write=False)
-        made._fill(rec.dt, channels, command_between=between, **about)
+        made._fill(rec.dt, channels, command_between=between, **rec._about)
         return made
 
     @property
@@ -38,12 +37,14 @@ class TimedRecord(Record):
         """The record that it was made of."""
         made = object.__new__(Record)
         channels = {key: getattr(self, key) for key in CHANNELS}
-        made._fill(self.dt, channels, name=self.name, torque_is=self.torque_is, notes=self.notes)
+        made._fill(self.dt, channels, **self._about)
         return made
 
-    def with_channels(self, *, dt: float | None = None, torque_is: str | None = None, **changed: ArrayLike | None) -> Record:
+    def with_channels(
+        self, *, dt: float | None = None, torque_is: str | None = None, torque_log: str | None = None, **changed: ArrayLike | None
+    ) -> Record:
         """See `Record`; another command, or sample time, is one between whose lines nothing is known."""
-        made = self.plain.with_channels(dt=dt, torque_is=torque_is, **changed)
+        made = self.plain.with_channels(dt=dt, torque_is=torque_is, torque_log=torque_log, **changed)
         if dt is not None or "command" in changed or self.command_between is None:
             return made
         return TimedRecord.of(made, self.command_between)

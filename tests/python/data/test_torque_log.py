@@ -1,0 +1,174 @@
+"""A log of torques that are means since the line before: what is made of it, and what a model and its controller make of that."""
+
+from __future__ import annotations
+
+import json
+import pickle
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import gaident as ga
+from drive_rig import Noise, Plant, between_lines, disturbances, run_drive, skip_without_library
+from gaident.cli.main import main
+from gaident.control.between import at_lines
+from gaident.errors import ReadError, RecordError
+from gaident.models.drive_torque import driven_by
+from gaident.models.held_torque import held_torque
+
+PERIOD = 125e-6
+PI = ga.PI(0.08, 4.0)
+TOTAL = 1e-3
+LEVELS = np.repeat([0, 20.0, -35, 10, -10, 50, -50, 25, -5, 5, -20, 40, -30, 15, -15, 0], 100)
+
+
+def logged(cascade: ga.Cascade, every: int, effects: Any = None, mean: bool = True) -> tuple[ga.Record, np.ndarray]:
+    """(the log of a drive of two masses with every r-th sample of the velocity, the torque at all samples of the controller)."""
+    skip_without_library()
+    plant = Plant(4e-4, 1e-3, 0.08, 4.0, every * PERIOD, 6e-4, 1e-3, 60.0, 0.02, cascade=cascade)
+    ticks = between_lines(plant, LEVELS)
+    made = run_drive(plant, ticks, effects or {}, **disturbances(Noise(white=0.03), len(ticks), np.random.default_rng(3)))
+    means = np.concatenate([np.zeros(every - 1), made.torque])[: len(ticks)].reshape(-1, every).mean(axis=1)
+    torque, kind = (means, "mean") if mean else (made.torque[::every], "sample")
+    return ga.Record(
+        plant.dt, command=ticks[::every], velocity=made.velocity[::every], torque=torque, torque_log=kind
+    ), made.torque
+
+
+def some(**more: Any) -> ga.Record:
+    n = np.arange(300)
+    return ga.Record(1e-3, **{"velocity": np.sin(n / 9), "torque": np.cos(n / 9), "torque_log": "mean", **more})
+
+
+def test_whatever_is_made_of_a_record_keeps_what_its_lines_contain(tmp_path: Path) -> None:
+    rec = some(name="run")
+    rec.save(tmp_path / "rec.json")
+    same = [pickle.loads(pickle.dumps(rec)), ga.load(tmp_path / "rec.json"), ga.Record.from_dict(rec.to_dict())]
+    made = [rec[10:200], rec.between(0.01, 0.2), rec.shifted(torque=1), rec.with_channels(velocity=rec.velocity + 1.0), *same]
+    assert {r.torque_log for r in made} == {"mean"} and all(r == rec for r in same)
+    assert rec != rec.with_channels(torque_log="sample") and rec.digest != rec.with_channels(torque_log="sample").digest
+    assert "(mean)" in repr(rec) and "(measured, mean)" in repr(some(torque_is="measured"))
+    early = {key: value for key, value in rec.to_dict().items() if key != "torque_log"}
+    assert ga.Record.from_dict(early).torque_log == "sample"
+    assert rec.with_channels(torque=None, command=rec.velocity).torque_log == "sample"
+
+
+def test_wrong_use_is_named() -> None:
+    with pytest.raises(RecordError, match="torque_log"):
+        some(torque_log="average")
+    with pytest.raises(RecordError, match="torque_log='mean', but the record has no torque"):
+        ga.Record(1e-3, command=np.zeros(50), velocity=np.zeros(50), torque_log="mean")
+
+
+def test_a_decimated_mean_is_no_longer_late() -> None:
+    """The mean since the line before is half a line old: of a sine, the torque comes out in its place."""
+    n = np.arange(4000)
+    slow = 2 * np.pi / 400
+    rec = ga.Record(1e-3, velocity=np.sin(slow * n), torque=np.sin(slow * (n - 0.5)), torque_log="mean").decimate(10)
+    assert rec.torque_log == "sample" and rec.torque is not None
+    assert np.abs(rec.torque - np.sin(slow * n[::10]))[30:-30].max() < 1e-3
+
+
+def test_a_file_says_it(tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    rec, _ = logged(ga.Cascade(PI, period=PERIOD), 4)
+    rows = np.column_stack([rec.time, rec.command, rec.velocity, rec.torque])
+    head = "time [s],command [rad/s],velocity [rad/s],torque [N m]"
+    np.savetxt("log.csv", rows, delimiter=",", header=head, comments="", fmt="%.17g")
+    assert ga.read("log.csv", torque_log="mean").torque_log == "mean" and ga.read("log.csv").torque_log == "sample"
+    with pytest.raises(ReadError, match="torque_log"):
+        ga.read("log.csv", torque_log="now")
+    with pytest.raises(ReadError, match="without decimate and resample"):
+        ga.read("log.csv", torque_log="mean", decimate=2)
+    with pytest.raises(ReadError, match="no such column is read"):
+        ga.read("log.csv", columns={"command": 1, "velocity": 2, "torque": None}, torque_log="mean")
+    Path("drive.toml").write_text(f'torque_log = "mean"\n[controller]\nkp = 0.08\nki = 4.0\nperiod = {PERIOD}\n')
+    options = ["--json"]
+    assert main(["diagnose", "log.csv", "--drive", "drive.toml", *options]) == 0
+    by_file = json.loads(capsys.readouterr().out)
+    assert by_file["verdict"] == "adequate"
+    Path("drive.toml").write_text(f"[controller]\nkp = 0.08\nki = 4.0\nperiod = {PERIOD}\n")
+    assert main(["diagnose", "log.csv", "--drive", "drive.toml", "--torque-log", "mean", *options]) == 0
+    assert json.loads(capsys.readouterr().out)["mechanics"] == by_file["mechanics"]
+
+
+def test_lines_of_means_end_with_their_own_sample() -> None:
+    made = np.arange(12.0)
+    assert np.array_equal(at_lines(made, 4, False), [0.0, 4.0, 8.0])
+    assert np.array_equal(at_lines(made, 4, True), [0.0, 2.5, 6.5])  # the first: three values of 0 before it
+    assert np.array_equal(at_lines(made, 4, True, before=2.0), [1.5, 2.5, 6.5])
+    assert np.array_equal(at_lines(np.stack([made, -made]), 4, True)[1], -at_lines(made, 4, True))
+
+
+@pytest.mark.parametrize("every", [2, 8])
+def test_the_torque_over_each_line_follows_from_the_means(every: int) -> None:
+    """What drives a model is the mean over the line ahead: of the controller's samples it is known to 0.1 % of the torque."""
+    controller = ga.Cascade(PI, period=PERIOD)
+    rec, torque = logged(controller, every)
+    true = torque.reshape(-1, every).mean(axis=1)
+    driven = driven_by(rec, controller)
+    assert driven.torque is not None and driven.torque_log == "sample"
+    size = np.sqrt(np.mean(true**2))
+    # Between the lines the velocity has noise that nobody logged: kp times it, beside the sample at the line.
+    left = np.sqrt(np.mean((driven.torque - true)[:-1] ** 2))
+    assert left < 2.0 * PI.kp * 0.03 / every + 1e-3 * size
+    as_sample, _ = logged(controller, every, mean=False)
+    assert left < 0.6 * np.sqrt(np.mean((driven_by(as_sample, controller).torque - true)[:-1] ** 2))
+
+
+def test_without_a_controller_a_mean_is_held_over_the_line_that_it_is_of() -> None:
+    """A torque that changes at the lines only: the model is driven by it as it was, also where the log is too slow to hold it."""
+    for dt, kind in ((1e-3, "commanded"), (0.01, "measured")):
+        torque = np.repeat([0.0, 1.0, -0.5, 0.3, 0.0], 40)
+        still = ga.Record(dt, torque=torque, velocity=np.zeros(200))
+        speed = ga.simulate(ga.OneMass(J=0.01, D=0.05), still)
+        late = np.append(0.0, torque[:-1])
+        rec = ga.Record(dt, torque=late, velocity=speed, torque_log="mean", torque_is=kind)
+        assert np.array_equal(held_torque(rec), np.append(late[1:], late[-1]))
+        assert np.abs(ga.simulate(ga.OneMass(J=0.01, D=0.05), rec) - speed)[:-1].max() < 1e-12
+        noise = 0.01 * np.random.default_rng(1).standard_normal(200)
+        found = ga.identify(rec.with_channels(velocity=speed + noise), seed=1)
+        assert isinstance(found.mechanics, ga.OneMass) and pytest.approx(0.01, rel=5e-3) == found.mechanics.J
+
+
+def test_under_a_controller_at_the_rate_of_the_log_a_mean_is_a_sample() -> None:
+    rec, _ = logged(ga.Cascade(PI, period=PERIOD), 1)
+    sample = rec.with_channels(torque_log="sample")
+    assert np.array_equal(driven_by(rec, ga.Cascade(PI, period=PERIOD)).torque, sample.torque)
+    means, samples = (ga.identify(r, PI, seed=1) for r in (rec, sample))
+    assert means.model == samples.model and any("mean is taken for a sample" in w for w in means.warnings)
+
+
+@pytest.mark.parametrize("every", [4, 8])
+@pytest.mark.parametrize(
+    ("true", "given", "named"),
+    [
+        (PI, PI, []),
+        (PI, ga.PI(None, None), []),
+        (PI, ga.PI(0.088, 4.4), ["other_gains"]),
+        (replace(PI, torque_limit=3.0), replace(PI, torque_limit=3.0), []),
+    ],
+)
+def test_a_log_of_means_is_diagnosed(every: int, true: ga.PI, given: ga.PI, named: list[str]) -> None:
+    rec, _ = logged(ga.Cascade(true, period=PERIOD), every)
+    dia = ga.diagnose(rec, ga.Cascade(given, period=PERIOD))
+    assert [f.effect for f in dia.causes] == named and dia.verdict == ("explained" if named else "adequate"), dia.summary()
+    inertia = dia.mechanics["inertia"]
+    assert abs(inertia.value - TOTAL) < min(3.5 * inertia.std, 2e-3 * TOTAL)
+    pi = dia.controller.velocity if isinstance(dia.controller, ga.Cascade) else dia.controller
+    assert isinstance(pi, ga.PI) and pi.kp == pytest.approx(0.08, rel=2e-3) and pi.ki == pytest.approx(4.0, rel=5e-3)
+
+
+def test_friction_and_a_torque_filter_are_named_of_means() -> None:
+    true = ga.Cascade(PI, period=PERIOD, torque_filters=(ga.LowPass(0.5e-3),))
+    rec, _ = logged(true, 8, {"coulomb_friction": {"torque": 0.05}})
+    dia = ga.diagnose(rec, ga.Cascade(PI, period=PERIOD))
+    assert {f.effect for f in dia.causes} == {"torque_filter", "coulomb_friction"} and dia.verdict == "explained", dia.summary()
+    found = {f.effect: f.parameters for f in dia.causes}
+    assert found["torque_filter"]["time_constant"].value == pytest.approx(0.5e-3, rel=0.01)
+    assert found["coulomb_friction"]["torque"].value == pytest.approx(0.05, rel=0.02)
+    as_samples = ga.diagnose(rec.with_channels(torque_log="sample"), ga.Cascade(PI, period=PERIOD))
+    assert "acceleration_feedforward" in {f.effect for f in as_samples.causes}, "what the kind of log prevents"
