@@ -44,7 +44,7 @@ from gaident.diagnosis.library.record import findings_of_the_record
 from gaident.diagnosis.library.sides import called_of, name_of, sides_of
 from gaident.diagnosis.library.terms import LIBRARY, in_controller
 from gaident.diagnosis.linear_part import linear_of_part
-from gaident.diagnosis.mechanics import base_shift, mechanics_of, negative_damping, of_the_age
+from gaident.diagnosis.mechanics import base_shift, mechanics_of, negative_damping, of_no_axis, of_the_age
 from gaident.diagnosis.note import Note
 from gaident.diagnosis.records.folded import ADVICE, folded
 from gaident.diagnosis.records.hygiene import cleaned, left_out, quantisation, unexplained
@@ -152,7 +152,8 @@ class Work:
     def _doubt_controller(self) -> None:
         again = self.driving.regained_from is not None
         self.gain_doubt = gain_doubt(self.found.space, self.final, again)
-        self.form = None if again or self.form_refused else unlogged_form(self.found.space, self.final)
+        self.doubtful = self.gain_doubt.better is not None or of_no_axis(mechanics_of(self.under, self.estimate))
+        self.form = None if again or self.form_refused else unlogged_form(self.found.space, self.final, self.doubtful)
 
     def with_joint_numbers(self) -> None:
         """The numbers of the controller that its torque showed, where the model of the axis shows them closer."""
@@ -172,17 +173,16 @@ class Work:
         self.notes.append(closer_numbers(old, numbers))
 
     def other_form(self) -> UnloggedForm | None:
-        """A form of controller that explains these records better than the given one and than other gains; None without one."""
+        """A form of controller that explains these records better than the given one and than other gains, or None."""
         gains, margin = self.gain_doubt.better, self.found.space.margin
         if self.form is None or not self.form.better(margin):
             return None
         return self.form if gains is None or self.form.score < gains.score - margin else None
 
     def confirms(self, given: Work) -> bool:
-        """Whether a search under another form of controller leaves noise, and fewer effects or less than under the given one."""
-        if not leaves_noise(self.found.space, self.final):
-            return False
-        return not leaves_noise(given.found.space, given.final) or len(self.final.effects) < len(given.final.effects)
+        """Whether a search under another form of controller leaves noise, and fewer effects, less or a better mechanism."""
+        fewer = given.doubtful or len(self.final.effects) < len(given.final.effects)
+        return leaves_noise(self.found.space, self.final) and (fewer or not leaves_noise(given.found.space, given.final))
 
     def refused(self, form: UnloggedForm) -> None:
         """Note that another form comes closer, although a search under it does not end in noise."""

@@ -68,7 +68,7 @@ class Effort:
     lag_peaks: int = effort(4, "1", "peaks of the correlation of two logs, from which their offset is fitted")
     best_points: int = effort(8, "1", "points of the grid of a controller's numbers, from which a fit starts")
     grid: int = effort(8, "1", "values of a filter's time constant or a position gain; blocks of a window, which is moved by one")
-    form_starts: int = effort(6, "1", "values of a number of an unlogged controller, of a notch's frequency 2 n - 1 of them")
+    form_starts: int = effort(10, "1", "values of a number of an unlogged controller, of a notch's frequency one more")
     notches: int = effort(14, "1", "values of a notch's frequency")
     tracking_times: int = effort(16, "1", "values of an anti-windup's tracking time")
     limits: int = effort(25, "1", "values of a limit in the given controller, tried on its logged torque")

@@ -170,5 +170,3 @@ def test_friction_and_a_torque_filter_are_named_of_means() -> None:
     found = {f.effect: f.parameters for f in dia.causes}
     assert found["torque_filter"]["time_constant"].value == pytest.approx(0.5e-3, rel=0.01)
     assert found["coulomb_friction"]["torque"].value == pytest.approx(0.05, rel=0.02)
-    as_samples = ga.diagnose(rec.with_channels(torque_log="sample"), ga.Cascade(PI, period=PERIOD))
-    assert "acceleration_feedforward" in {f.effect for f in as_samples.causes}, "what the kind of log prevents"

@@ -1,11 +1,13 @@
 """Mechanisms found anew in records that a controller with other numbers drives, without a model to start from.
 
 The linear model that is identified there contains the mechanism, with roots of its own for what is not modelled yet.
+The resonance of a shaft is also searched beside one mass, with and without what nearly every drive has.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable
+from dataclasses import replace
 
 import numpy as np
 
@@ -20,22 +22,38 @@ from gaident.estimation.parameterisation import Parameterisation
 from gaident.estimation.prediction import OpenLoop
 from gaident.estimation.projection import WORST
 from gaident.estimation.term import Scales, Term
+from gaident.identification.closed_loop import space_of
 from gaident.identification.identify import identify
 from gaident.models.model import Model
 from gaident.policy.table import POLICY
 
-__all__ = ["best_on_a_shaft", "dry_friction", "linear_mechanisms", "with_term", "with_usual_effects"]
+__all__ = ["dry_friction", "mechanisms_under", "with_term", "with_usual_effects"]
+
+POLES = (1, 1)  # no decision: a formula: of two masses, p
+ZEROS = (2, 3)  # no decision: a formula: of two masses, q, and one pole and zero more
 
 
-def linear_mechanisms(scales: Scales, objective: Objective, data: DataSet) -> list[Fit]:
-    """One mass and two, fitted to the raw errors of data from what their linear model contains; [] where there is none."""
+def mechanisms_under(space: ModelSpace, scales: Scales, objective: Objective, data: DataSet) -> list[Fit]:
+    """One mass and two, with the usual effects where they are worth it, fitted to the raw errors of data; [] where none fits."""
+    one = _short(scales, objective, data, balanced(data))
+    if not one.cost < WORST:
+        return []
+    usual = with_usual_effects(space, objective, one)
+    bases = [one, usual] if usual.effects else [one]
+    found = [fit for base in bases for fit in _on_a_shaft(objective, base)] + _identified(scales, objective, data)
+    return [usual, *(with_usual_effects(space, objective, fit) for fit in found)]
+
+
+def _identified(scales: Scales, objective: Objective, data: DataSet) -> list[Fit]:
+    """[the best two masses, and one, that the linear model of the data contains]; [] where there is no such model."""
+    records, controller = list(data.records), data.controller
     try:
-        identified = identify(list(data.records), data.controller, workers=1).model
+        few = replace(space_of(records, controller), p=POLES, q=ZEROS)
+        found = identify(records, controller, few, workers=1).model
     except GaidentError:  # such as a velocity that falls when the torque of that controller rises
         return []
-    starts = ([balanced(data), *rigid(identified)], reduced(identified))
-    parts = [_mechanisms([_short(scales, objective, data, model) for model in models]) for models in starts]
-    return [fit for part in parts for fit in part]
+    parts = ([_short(scales, objective, data, model) for model in models] for models in (rigid(found), reduced(found)))
+    return [fit for part in parts for fit in _mechanisms(part)]
 
 
 def _short(scales: Scales, objective: Objective, data: DataSet, model: Model) -> Fit:
@@ -49,15 +67,15 @@ def _mechanisms(fits: Iterable[Fit]) -> list[Fit]:
     return [min(known, key=lambda f: f.cost)] if known else []
 
 
-def best_on_a_shaft(objective: Objective, one: Fit) -> list[Fit]:
-    """[one mass with its effects as two], [] where that is no mechanism, or where it has two already."""
-    if one.parameters.masses > 1:
-        return []
+def _on_a_shaft(objective: Objective, one: Fit) -> list[Fit]:
+    """[one mass with its effects as two], [] where that is no mechanism."""
     return _mechanisms(ls.fit(objective, h, x, WHITE, POLICY.short) for h, x in on_a_shaft(objective, one))
 
 
-def dry_friction(space: ModelSpace) -> list[Term]:
-    """[its simplest form], [] where it is not testable."""
+def dry_friction(space: ModelSpace, fit: Fit) -> list[Term]:
+    """[its simplest form], [] where it is not testable, or in the fit."""
+    if any(t.levels for t in fit.parameters.terms):
+        return []
     return [t for t in space.allowed if t.levels and t.simplest][:1]
 
 
@@ -66,9 +84,9 @@ def with_usual_effects(space: ModelSpace, objective: Objective, fit: Fit) -> Fit
 
     A torque that lacks a filter may hide them.
     """
-    late = [t for t in space.allowed if t.in_series and t.place == "actuator"]
     fit = ls.scored(objective, fit)
-    for terms in (dry_friction(space), late):
+    late = [t for t in space.allowed if t.in_series and t.place == "actuator" and t.name not in fit.effects]
+    for terms in (dry_friction(space, fit), late):
         fit = min((fit, *(with_term(objective, fit, term) for term in terms)), key=space.score)
     return fit
 

@@ -104,7 +104,7 @@ TIME_CONSTANT = FormNumber(
     lambda dt, duration: np.geomspace(0.5 * dt, 0.1 * POLICY.form_slowest * duration, POLICY.form_starts),
 )
 FREQUENCY = FormNumber(
-    "frequency", "Hz", _band, lambda dt, duration: np.geomspace(*_band(dt, duration), 2 * POLICY.form_starts + 1)[1:-1]
+    "frequency", "Hz", _band, lambda dt, duration: np.geomspace(*_band(dt, duration), POLICY.form_starts + 3)[1:-1]
 )
 # From undamped zeros to real ones, with which a filter has no notch.
 OF_ZEROS = FormNumber("numerator_damping", "1", lambda dt, duration: (0.0, 1.0), lambda dt, duration: (0.1,), logarithm=False)

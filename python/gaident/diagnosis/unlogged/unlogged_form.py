@@ -8,14 +8,14 @@ A filter or a command weight that the drive has and the PI has not is then missi
 and looks like mechanics: a lag, a resonance, an inertia that is far off.
 Each form has up to three numbers z, which are fitted with the model's (see `under_controller`).
 
-A form is searched where the selected model leaves more than noise, or has an effect that is linear in series, as a filter of
-the torque is.
+A form is searched where the selected model leaves more than noise, where it has an effect that is linear in series, as a filter
+of the torque is, where its mechanism drives itself, as none does, and where other gains explain the records better.
 It is judged by the criterion that selected the model.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -27,7 +27,7 @@ from gaident.control.cascade import Cascade
 from gaident.control.found import NUMBER_STEP, FoundNumbers
 from gaident.control.pi import PI
 from gaident.diagnosis.selection.moves import Moves
-from gaident.diagnosis.unlogged.anew import best_on_a_shaft, dry_friction, linear_mechanisms, with_term, with_usual_effects
+from gaident.diagnosis.unlogged.anew import dry_friction, mechanisms_under, with_term, with_usual_effects
 from gaident.diagnosis.unlogged.controller_forms import VARIANTS, ControllerForm
 from gaident.diagnosis.unlogged.other_gains import OTHER_GAINS
 from gaident.diagnosis.unlogged.under_controller import UnderController, out_of_reach
@@ -36,6 +36,7 @@ from gaident.estimation.noise_model import WHITE
 from gaident.estimation.objective import Fit, Objective
 from gaident.estimation.prediction import OpenLoop
 from gaident.estimation.projection import project_out
+from gaident.policy.table import POLICY
 from gaident.results.estimate import Estimate
 from gaident.results.finding import Finding
 
@@ -75,34 +76,35 @@ def in_series(fit: Fit) -> tuple[str, ...]:
     return tuple(t.name for t in fit.parameters.terms if t.in_series)
 
 
-def unlogged_form(space: Moves, final: Fit) -> UnloggedForm | None:
+def unlogged_form(space: Moves, final: Fit, doubtful: bool = False) -> UnloggedForm | None:
     """The form of controller with which a model explains the records best.
 
     Searched beside the selected model, with or without its effects in series, and beside mechanisms that are found anew.
     None where a torque is logged, or where the loop is not closed by a bare PI from rest.
     None also where the model leaves noise and contains no effect in series, which a filter could replace.
+    doubtful: whether its mechanism is none of an axis, or other gains explain the records better.
     """
     data, series = space.data, in_series(final)
+    settled = leaves_noise(space, final) and not doubtful
     if data.pi is None or any(r.torque is not None or r.command is None for r in data.records):
         return None
-    if data.loop_only or any(data.moving) or any(data.stored) or (leaves_noise(space, final) and not series):
+    if data.loop_only or any(data.moving) or any(data.stored) or (settled and not series):
         return None
     objective = replace(space.objective)  # with a memory of its own, because every controller makes another data set
     bases = [_without(space, final, series)]
-    if not leaves_noise(space, final):
+    if not settled:
         bases += [final] * bool(series) + [_without(space, final, final.effects)] * (set(final.effects) > set(series))
     starts = _promising(space, objective, data.pi, [_opened(space, base) for base in bases])
-    if not leaves_noise(space, final):
+    if not settled:
         starts += [
             (v, under, with_term(objective, base, friction), z)
             for v, under, base, z in starts
-            for friction in dry_friction(space)
-            if not _rubs(base)
+            for friction in dry_friction(space, base)
         ]
     starts += [(form, under, fit, z) for form in VARIANTS for under, fit, z in _anew(space, objective, final, form)]
     beyond = max(out_of_reach(space, f) for f in (final, _opened(space, final)))
-    found = [_fitted(space, objective, beyond, *one) for one in starts]
-    known = [f for f in found if f is not None]
+    known = _ends(space, objective, beyond, starts)
+    known += _ends(space, objective, beyond, _once_more(space, objective, data.pi, known))
     best = min(known, key=lambda f: f[1], default=None)
     if best is None or any(f[2].finding == OTHER_GAINS and f[1] < best[1] + space.margin for f in known):
         return None
@@ -123,11 +125,6 @@ def _without(space: Moves, fit: Fit, effects: tuple[str, ...]) -> Fit:
     for effect in effects:
         fit = space.without(fit, effect)
     return fit
-
-
-def _rubs(fit: Fit) -> bool:
-    """Whether a model has dry friction."""
-    return any(term.levels for term in fit.parameters.terms)
 
 
 def _opened(space: Moves, fit: Fit) -> Fit:
@@ -161,27 +158,51 @@ def _starts(space: Moves, objective: Objective, pi: PI, bases: list[Fit]) -> Ite
 
 def _grid(space: Moves, pi: PI, form: ControllerForm) -> list[tuple[UnderController, Vector]]:
     """Models under a form, with each of its starts."""
-    dt, duration = space.data.dt, max(len(r) * r.dt for r in space.data.records)
-    low, high = form.ends(dt, duration)
-    under = UnderController(space.data, partial(form.of, pi), low, high)
-    return [(under, np.clip(z, low, high)) for z in form.starts(dt, duration)]
+    under = _under(space, pi, form)
+    return [(under, np.clip(z, under.low, under.high)) for z in form.starts(*_times(space))]
+
+
+def _under(space: Moves, pi: PI, form: ControllerForm) -> UnderController:
+    return UnderController(space.data, partial(form.of, pi), *form.ends(*_times(space)))
+
+
+def _times(space: Moves) -> tuple[float, float]:
+    """(sample time, duration of the longest record) [s]."""
+    return space.data.dt, max(len(r) * r.dt for r in space.data.records)
 
 
 def _anew(space: Moves, objective: Objective, final: Fit, form: ControllerForm) -> list[tuple[UnderController, Fit, Vector]]:
-    """Mechanisms that are found anew under a form, each at that of its starts at which it leaves least.
+    """Mechanisms that are found anew under a form, the best of all its starts.
 
     The mechanism that was found under the given controller may be far off: its inertia by a multiple.
     """
-    best: dict[int, tuple[UnderController, Fit, Vector]] = {}
     assert space.data.pi is not None
-    for under, z in _grid(space, space.data.pi, form):
-        for fit in linear_mechanisms(final.parameters.scales, objective, under.over(z)):
-            kept = best.get(fit.parameters.masses)
-            if kept is None or fit.cost < kept[1].cost:
-                best[fit.parameters.masses] = under, fit, z
-    usual = [(under, with_usual_effects(space, objective, fit), z) for under, fit, z in best.values()]
-    grown = [(under, shaft, z) for under, fit, z in usual for shaft in best_on_a_shaft(objective, fit)]
-    return usual + grown
+    found = [
+        (under, fit, z)
+        for under, z in _grid(space, space.data.pi, form)
+        for fit in mechanisms_under(space, final.parameters.scales, objective, under.over(z))
+    ]
+    best = sorted(found, key=lambda one: space.score(one[1]))
+    return [one for n in (1, 2) for one in [f for f in best if f[1].parameters.masses == n][: POLICY.starts]]
+
+
+def _ends(space: Moves, objective: Objective, beyond: float, starts: Sequence[_Start]) -> list[_End]:
+    found = (_fitted(space, objective, beyond, *start) for start in starts)
+    return [end for end in found if end is not None]
+
+
+def _once_more(space: Moves, objective: Objective, pi: PI, ends: Sequence[_End]) -> list[_Start]:
+    """The best end of each form, where its model is better with one of the usual effects that it has not.
+
+    Wrong numbers of a form hide them.
+    """
+    starts: list[_Start] = []
+    for form in VARIANTS:
+        best = min((end for end in ends if end[2] is form), key=lambda end: end[1], default=None)
+        if best is not None:
+            fit, numbers = with_usual_effects(space, objective, best[0]), best[3]
+            starts += [(form, _under(space, pi, form), fit, numbers.at)] * (len(fit.effects) > len(best[0].effects))
+    return starts
 
 
 def _fitted(
