@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import difflib
 import math
+import os
 from collections.abc import Iterable, Mapping
+from pathlib import Path
 
 from gaident.errors import GaidentError
 
@@ -21,6 +23,16 @@ def real_number(value: object, name: str, error: type[GaidentError], remedy: str
     if not math.isfinite(number):
         raise error(f"{name} is {value!r}: {remedy}")
     return number
+
+
+def checked_path(value: object, name: str = "path", error: type[GaidentError] = GaidentError) -> Path:
+    """`value` as a Path; raises `error` naming `name`, the value and the remedy where it is no path."""
+    text = os.fspath(value) if isinstance(value, str | os.PathLike) else None
+    if not isinstance(text, str):
+        raise error(f"{name} is {value!r:.80}: give the file's name as str or pathlib.Path")
+    if "\0" in text:
+        raise error(f"{name} is {text!r:.80}: no file's name contains the character NUL; correct it")
+    return Path(text)
 
 
 def one_of(value: object, name: str, allowed: Iterable[str], error: type[GaidentError]) -> str:
