@@ -142,6 +142,17 @@ class Own:
                 "choices are numpy's where(), minimum(), maximum()"
             ) from reason
 
+    def refuse(self, answer: object, time: float) -> None:
+        """What the core calls where a function answers what none may: nothing, or a friction that pushes."""
+        if answer is None:
+            raise ModelError(
+                f"the effect {self.name!r}: its function returns None at {time:g} s: return an array of numbers always"
+            )
+        raise ModelError(
+            f"the effect {self.name!r}: its friction is {answer:g} at {time:g} s: it is the size of a torque against the motion, "
+            "return numbers >= 0, as numpy.abs() or maximum(..., 0) give"
+        )
+
     def neutral(self, values: Sequence[float]) -> bool:
         """Whether these values make it the identity."""
         return all(math.isnan(p.neutral) or v == p.neutral for p, v in zip(self.parameters, values, strict=True))
@@ -249,6 +260,8 @@ def _answer(own: Own, signals: Mapping[str, Signal], values: Sequence[Signal]) -
     for view in views:
         view.setflags(write=False)
     found = own.ask(w, theta, u, r, 0.25, *given)
+    if found is None:
+        own.refuse(None, 0.25)
     try:
         answer = np.asarray(found, dtype=np.float64)
     except (TypeError, ValueError):
