@@ -25,6 +25,20 @@ def real_number(value: object, name: str, error: type[GaidentError], remedy: str
     return number
 
 
+def above_zero(value: object, name: str, error: type[GaidentError], remedy: str) -> float:
+    """`value` as a finite float above 0, a bool left out; raises `error` naming `name`, the value and the remedy."""
+    if isinstance(value, bool) or not (number := real_number(value, name, error, remedy)) > 0.0:
+        raise error(f"{name} is {value!r}: {remedy}")
+    return number
+
+
+def yes_or_no(value: object, name: str, error: type[GaidentError]) -> bool:
+    """`value`, where it is True or False."""
+    if not isinstance(value, bool):
+        raise error(f"{name} is {value!r:.80}: give True or False")
+    return value
+
+
 def checked_path(value: object, name: str = "path", error: type[GaidentError] = GaidentError) -> Path:
     """`value` as a Path; raises `error` naming `name`, the value and the remedy where it is no path."""
     text = os.fspath(value) if isinstance(value, str | os.PathLike) else None

@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 import hashlib
-import math
-from collections.abc import Mapping, Sequence
+import sys
+from collections.abc import Iterable, Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
-from gaident.arguments import arg
 from gaident.axis import Text
 from gaident.checks import one_of
-from gaident.data.signals.arrays import MINIMUM_SAMPLES, channel, positive_number
+from gaident.data.signals.arrays import MINIMUM_SAMPLES, channel, sample_time
 from gaident.data.signals.wraps import continued, wrapped_words
 from gaident.data.torque_kind import COMMANDED, TORQUE_KINDS
 from gaident.errors import RecordError
@@ -31,11 +30,6 @@ __all__ = [
 ]
 
 HASH_BLOCK = 1 << 18  # no decision: memory; values of a block
-
-
-def sample_time(dt: object) -> float:
-    """The sample time [s], once it is a number above 0. Raises RecordError."""
-    return positive_number(dt, "dt", "s", f"give the sample time in seconds, for example {arg('dt', '1e-3')}")
 
 
 def torque_kind(torque_is: object, torque: NDArray[np.float64] | None) -> str:
@@ -82,7 +76,7 @@ def _beside(command: NDArray[np.float64], position: NDArray[np.float64], period:
 
 def texts(notes: Sequence[str]) -> tuple[str, ...]:
     """The notes, once they are texts. Raises RecordError."""
-    if isinstance(notes, str) or not all(isinstance(note, str) for note in notes):
+    if isinstance(notes, str) or not isinstance(notes, Iterable) or not all(isinstance(note, str) for note in notes):
         raise RecordError(f"notes={notes!r:.80} is no list of texts; give notes=[...] or leave it out")
     return tuple(notes)
 
@@ -111,8 +105,11 @@ def check_bounds(t0: object, t1: object) -> None:
     for key, value in (("t0", t0), ("t1", t1)):
         if isinstance(value, bool) or not isinstance(value, int | float | np.integer | np.floating):
             raise RecordError(f"between({t0!r}, {t1!r}): {key} is no number; give seconds")
-        if math.isnan(value):
+        if value != value:  # NaN; math.isnan fails for whole numbers beyond 1e308
             raise RecordError(f"between({t0!r}, {t1!r}): {key} is NaN; give seconds")
+    for key, value in (("t0", t0), ("t1", t1)):
+        if isinstance(value, int) and abs(value) > sys.float_info.max:
+            raise RecordError(f"between(...): {key} is a whole number beyond all times; give seconds")
     if not t0 < t1:  # type: ignore[operator]  # both are numbers
         raise RecordError(f"between({t0!r}, {t1!r}): t0 must be before t1; exchange them")
 

@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from gaident.checks import real_number
 from gaident.control.filtering import filtered
-from gaident.data.signals.arrays import channel, positive_number
+from gaident.data.signals.arrays import channel, positive_number, sample_time
 from gaident.errors import RecordError
 from gaident.policy.table import POLICY
 
@@ -149,7 +149,7 @@ class Winding:
         RecordError
             An array that a Record would refuse, or a sample time that is not above 0.
         """
-        i, dt = channel(current, "current"), positive_number(dt, "dt", "s", "give the sample time in seconds")
+        i, dt = channel(current, "current"), sample_time(dt)
         following = np.concatenate([i[1:], i[-1:]])
         if self.inductance == 0.0:
             return following
@@ -161,7 +161,7 @@ class Winding:
     def _currents(self, voltage: ArrayLike, velocity: ArrayLike, dt: float) -> tuple[Vector, Vector, float]:
         """(i(n), s(n) that it goes to, dt), checked."""
         U, w = channel(voltage, "voltage"), channel(velocity, "velocity")
-        dt = positive_number(dt, "dt", "s", "give the sample time in seconds")
+        dt = sample_time(dt)
         if len(U) != len(w):
             raise RecordError(f"voltage has {len(U)} samples, velocity {len(w)}: give them of the same samples")
         towards = (U - 0.5 * self.emf * (w + np.concatenate([w[1:], w[-1:]]))) / self.resistance

@@ -13,17 +13,18 @@ of second order), once per step of the controller at command and actuator; `regi
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from gaident.checks import yes_or_no
 from gaident.errors import ModelError
 from gaident.policy.table import POLICY
 
-__all__ = ["OWN", "PLACES", "Function", "Own", "Parameter", "Signals", "checked", "starts"]
+__all__ = ["OWN", "PLACES", "Function", "Own", "Parameter", "Signals", "check_kinds", "checked", "starts"]
 
 Signal = NDArray[np.float64]
 Function = Callable[..., Any]
@@ -174,6 +175,15 @@ def starts(p: Parameter, count: int = POLICY.own_values) -> tuple[float, ...]:
     # no decision: a start
     kept = tuple(v for v in values if abs(v - p.neutral) > 0.01 * span or math.isnan(p.neutral))
     return kept or (p.lowest + 0.75 * span,)
+
+
+def check_kinds(name: object, parameters: object, replace: object) -> None:
+    """Raises ModelError where what `register` is given is of another kind."""
+    if not isinstance(name, str):
+        raise ModelError(f"name is {name!r:.80}: give the effect's name as text")
+    if not isinstance(parameters, Iterable) or isinstance(parameters, str | bytes | Mapping):
+        raise ModelError(f"parameters of {name} is {parameters!r:.80}: give a list of gaident.effects.Parameter")
+    yes_or_no(replace, "replace", ModelError)
 
 
 def checked(own: Own) -> Own:

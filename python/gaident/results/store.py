@@ -8,6 +8,7 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
+from gaident.checks import checked_path
 from gaident.data.record import SCHEMA as RECORD
 from gaident.data.record import Record
 from gaident.errors import GaidentError
@@ -56,16 +57,15 @@ def load(path: str | os.PathLike[str]) -> Saved:
     >>> ga.load("run.json") == rec
     True
     """
+    file = checked_path(path)
     try:
-        text = Path(path).read_text(encoding="utf-8")
+        text = file.read_text(encoding="utf-8")
     except FileNotFoundError as error:
         raise GaidentError(f"{path}: there is no such file; check the path (now in {Path.cwd()})") from error
     except UnicodeDecodeError as error:
         raise GaidentError(f"{path}: is no text; give a file that save() wrote, or read a log with gaident.read") from error
     except OSError as error:
         raise GaidentError(f"{path}: cannot be read ({error.strerror}); give a file that save() wrote") from error
-    except TypeError as error:
-        raise GaidentError(f"path={path!r} is no path; give the file's name as str or pathlib.Path") from error
     try:
         data = json.loads(text)
     except json.JSONDecodeError as error:

@@ -29,10 +29,10 @@ NAMES = st.text("aZ0_ -./\\,;:%{}'\"\n\r\t\x00\x1f\x7f\xa0éßΩ漢\u0301\u200b\
 
 
 def array(length: int, drawn: tuple[int, int]) -> Any:
-    """Numbers of all magnitudes; drawn from a seed, for a thousand drawn numbers would take seconds."""
+    """Numbers of all magnitudes that a record takes; drawn from a seed, for a thousand drawn numbers would take seconds."""
     seed, decade = drawn
     rng = np.random.default_rng(seed)
-    return rng.normal(size=length) * 10.0 ** rng.integers(-decade, decade + 1, length)
+    return rng.normal(size=length) * 10.0 ** rng.integers(-decade, min(decade, 28) + 1, length)
 
 
 @st.composite

@@ -111,7 +111,7 @@ def test_files_that_cannot_be_read_are_named(tmp_path: Path) -> None:
                           ("log.bin", r"log\.bin: is no text.*gaident\.read")):  # fmt: skip
         with pytest.raises(ga.GaidentError, match=message):
             ga.load(tmp_path / name)
-    with pytest.raises(ga.GaidentError, match="path=3 is no path"):
+    with pytest.raises(ga.GaidentError, match="path is 3: give the file"):
         ga.load(3)  # type: ignore[arg-type]
 
 

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from gaident.checks import real_number
 from gaident.data.record import Record
 from gaident.data.signals.arrays import channel
 from gaident.data.signals.decimation import decimated
@@ -116,7 +117,13 @@ def estimate_winding(
     if not len(U) == len(i) == len(w):
         raise RecordError(f"voltage, current and velocity have {len(U)}, {len(i)} and {len(w)} samples: give the same of each")
     rec = Record(dt, velocity=w, torque=i)
-    cutoff = cutoff_of(rec, ORDER) if cutoff_hz is None else float(cutoff_hz)
+    with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
+        return _estimated(U, i, w, rec, cutoff_hz)
+
+
+def _estimated(U: Vector, i: Vector, w: Vector, rec: Record, cutoff_hz: float | None) -> WindingFit:
+    remedy = f"give a corner between 0 and {0.5 / rec.dt:g} Hz, or None"  # no decision: a formula: the Nyquist frequency
+    cutoff = cutoff_of(rec, ORDER) if cutoff_hz is None else real_number(cutoff_hz, "cutoff_hz", RecordError, remedy)
     if not 0.0 < cutoff < 0.5 / rec.dt:  # no decision: a formula: the Nyquist frequency
         raise RecordError(f"cutoff_hz={cutoff_hz!r}: give a corner between 0 and {0.5 / rec.dt:g} Hz, or None")
     factor = decimation_of(None, cutoff, rec.dt)
