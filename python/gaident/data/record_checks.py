@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import re
 import sys
 from collections.abc import Iterable, Mapping, Sequence
 
@@ -30,6 +31,9 @@ __all__ = [
 ]
 
 HASH_BLOCK = 1 << 18  # no decision: memory; values of a block
+
+
+_BYTES = re.compile("[\ud800-\udfff]")  # as Python reads bytes of a name: U+DC80 to U+DCFF
 
 
 def torque_kind(torque_is: object, torque: NDArray[np.float64] | None) -> str:
@@ -72,6 +76,13 @@ def unwrapped(channels: dict[str, NDArray[np.float64] | None], dt: float, new: b
 def _beside(command: NDArray[np.float64], position: NDArray[np.float64], period: float) -> NDArray[np.float64]:
     """The command moved by whole ranges to the position, at the first sample."""
     return command + period * float(np.round((position[0] - command[0]) / period))
+
+
+def readable(name: object) -> str:
+    """The name as text that can be written: bytes of a file's name that are no UTF-8 as the letters that they are in Latin-1."""
+    if not isinstance(name, str):
+        raise RecordError(f"name={name!r} is no text; give a str")
+    return _BYTES.sub(lambda found: chr(ord(found[0]) - 0xDC00) if "\udc80" <= found[0] <= "\udcff" else "\ufffd", name)
 
 
 def texts(notes: Sequence[str]) -> tuple[str, ...]:

@@ -302,6 +302,8 @@ class Identification(SavedResult):
         """
         check_schema(data, SCHEMA, SCHEMA_VERSION)
         with undamaged(cls.KIND):
+            if "gain" not in data["parameters"]:
+                raise GaidentError("parameters lacks gain, which every model has; save it again")
             return cls(
                 model=Model.from_dict(data["model"]),
                 controller=None if data["controller"] is None else controller_of(data["controller"]),

@@ -16,6 +16,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+import gaident as ga
 from gaident.data import Record
 from gaident.errors import GaidentError, RecordError
 
@@ -301,3 +302,11 @@ def test_a_long_record_costs_one_copy() -> None:
 def test_data_does_not_import_scipy() -> None:
     code = "import sys, gaident.data; sys.exit(any(name.split('.')[0] == 'scipy' for name in sys.modules))"
     subprocess.run([sys.executable, "-c", code], check=True)
+
+
+def test_a_name_that_is_no_text_of_unicode_can_be_written(tmp_path: Path) -> None:
+    """A file named in Latin-1 comes with its bytes as halves of characters, which no file and no picture takes."""
+    rec = Record(1e-3, torque=np.ones(20), velocity=np.zeros(20), name="run\udce9 \ud800 é")
+    assert rec.name == "runé \ufffd é"
+    rec.save(tmp_path / "run.json")
+    assert ga.load(tmp_path / "run.json") == rec
