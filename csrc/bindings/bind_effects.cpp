@@ -161,31 +161,28 @@ public:
         width_ = models.size();
         signals_ = signals;
         answer_ = answer;
-        velocity_ = seen(signals.velocity);
-        angle_ = seen(signals.angle);
-        torque_ = seen(signals.torque);
-        command_ = seen(signals.command);
         parameters_.clear();
         for (const OwnEffect& e : effects_) {
-            py::list lanes;
+            std::vector<RealArray> lanes;
             for (py::ssize_t k = 0; k < e.values.shape(1); ++k) {
                 RealArray column(static_cast<py::ssize_t>(width_));
                 for (std::size_t lane = 0; lane < width_; ++lane)
                     column.mutable_data()[lane] = e.values.at(static_cast<py::ssize_t>(models[lane]), k);
-                column.attr("setflags")(py::arg("write") = false);
-                lanes.append(column);
+                lanes.push_back(read_only(std::move(column)));
             }
-            parameters_.push_back(py::tuple(lanes));
+            parameters_.push_back(std::move(lanes));
         }
     }
 
     void ask(OwnPlace place, double time) override {
         double* const signal = replaced_at(place);
         const bool chained = signal != nullptr;
+        const bool brakes = place == OwnPlace::friction || place == OwnPlace::friction_at_load;
         if (!chained) std::fill(answer_, answer_ + width_, 0.0);
         for (std::size_t i = 0; i < effects_.size(); ++i) {
             if (effects_[i].place != place) continue;
-            const py::object answer = effects_[i].function(velocity_, angle_, torque_, command_, time, *parameters_[i]);
+            const py::object answer = asked(effects_[i].function, arguments(parameters_[i], time));
+            if (answer.is_none()) refuse(effects_[i].function, answer, time);
             const RealArray found = RealArray::ensure(answer);
             if (!found || (found.size() != 1 && static_cast<std::size_t>(found.size()) != width_)) {
                 PyErr_Clear();
@@ -193,6 +190,7 @@ public:
             }
             for (std::size_t lane = 0; lane < width_; ++lane) {
                 const double value = found.data()[found.size() == 1 ? 0 : lane];
+                if (brakes && value < 0.0) refuse(effects_[i].function, py::float_(value), time);
                 if (chained) signal[lane] = value;
                 else answer_[lane] += value;
             }
@@ -214,15 +212,30 @@ private:
         }
         return nullptr;
     }
-    RealArray seen(double* lanes) const {
-        RealArray view(static_cast<py::ssize_t>(width_), lanes, py::none());
-        view.attr("setflags")(py::arg("write") = false);
-        return view;
+    // What no function may answer; `refuse` of the object whose method is asked raises, in words of its own.
+    [[noreturn]] static void refuse(const py::function& function, const py::object& answer, double time) {
+        const py::object owner = py::getattr(function, "__self__", py::none());
+        if (py::hasattr(owner, "refuse")) owner.attr("refuse")(answer, time);
+        throw std::invalid_argument("own: an effect's function gave " + std::string(py::repr(answer)));
+    }
+
+    // Signals and parameters as a function is given them: copies, which it may keep for as long as it likes.
+    py::tuple arguments(const std::vector<RealArray>& parameters, double time) const {
+        py::tuple all(parameters.size() + 5);
+        py::size_t k = 0;
+        for (const double* const lanes : {signals_.velocity, signals_.angle, signals_.torque, signals_.command})
+            all[k++] = read_only(RealArray(static_cast<py::ssize_t>(width_), lanes));
+        all[k++] = time;
+        for (const RealArray& lanes : parameters) all[k++] = lanes;
+        return all;
+    }
+    static RealArray read_only(RealArray lanes) {
+        py::detail::array_proxy(lanes.ptr())->flags &= ~py::detail::npy_api::NPY_ARRAY_WRITEABLE_;
+        return lanes;
     }
 
     std::vector<OwnEffect> effects_;
-    std::vector<py::tuple> parameters_;
-    RealArray velocity_, angle_, torque_, command_;
+    std::vector<std::vector<RealArray>> parameters_;
     OwnSignals signals_{};
     double* answer_ = nullptr;
     std::size_t width_ = 0;

@@ -26,7 +26,7 @@ RealArray filtered_rows(const RealArray& b, const RealArray& a, const RealArray&
     RealArray out({values.shape(0), values.shape(1)});
     double* const v = out.mutable_data();
     {
-        const py::gil_scoped_release release;
+        const ReleasedGil released;
         filtered(view(b), view(a), values.data(), v, rows, n, lengths);
     }
     return out;
@@ -50,7 +50,7 @@ RealArray powers_of(const RealArray& b, const RealArray& a, const RealArray& e, 
     RealArray out(b.shape(0));
     double* const sums = out.mutable_data();
     {
-        const py::gil_scoped_release release;
+        const ReleasedGil released;
         filtered_powers(b.data(), a.data(), static_cast<std::size_t>(b.shape(0)), static_cast<std::size_t>(b.shape(1)), e.data(),
                         weight.data(), lengths, sums);
     }
@@ -63,7 +63,7 @@ RealArray errors_of(const RealArray& measured, py::array_t<double, py::array::c_
         throw std::invalid_argument("rows: a matrix with as many columns as were measured");
     double* const out = rows.mutable_data();
     {
-        const py::gil_scoped_release release;
+        const ReleasedGil released;
         subtracted(measured.data(), out, static_cast<std::size_t>(rows.shape(0)), static_cast<std::size_t>(rows.shape(1)), lost);
     }
     return rows;
@@ -78,7 +78,7 @@ ComplexArray states(const ComplexArray& A, const ComplexArray& drive, const Comp
     std::complex<double>* const x = out.mutable_data();
     std::copy_n(drive.data(), drive.size(), x);
     {
-        const py::gil_scoped_release release;
+        const ReleasedGil released;
         state_recursion(A.data(), {start.data(), static_cast<std::size_t>(m)}, x, static_cast<std::size_t>(drive.shape(0)),
                         newest);
     }

@@ -49,11 +49,9 @@ RefineOptions options_of(const std::optional<SearchRanges>& ranges, const std::v
     return o;
 }
 
-// (generations done, best fitness, number of species, (p, q) of the one that leads)
-using Report = std::function<void(std::size_t, double, std::size_t, std::pair<int, int>)>;
-
+// `report`: a function of generations done, best fitness, number of species, (p, q) of the one that leads.
 std::vector<PlantTrial> search_records(PyExperiment& e, const SearchRanges& ranges, const PlantSettings& settings, int trials,
-                                       std::uint64_t seed, int workers, const std::optional<Report>& report) {
+                                       std::uint64_t seed, int workers, const std::optional<py::function>& report) {
     std::vector<PlantTrial> result;
     Progress progress;
     e.stop = false;
@@ -61,7 +59,9 @@ std::vector<PlantTrial> search_records(PyExperiment& e, const SearchRanges& rang
         e.stop, [&] { result = search_plant(e.experiment, ranges, settings, trials, seed, workers, progress); },
         [&] {
             const Structure leading = leading_structure(ranges, progress);
-            if (report) (*report)(progress.done.load(), progress.best.load(), progress.species.load(), {leading.p, leading.q});
+            if (report)
+                asked(*report, py::make_tuple(progress.done.load(), progress.best.load(), progress.species.load(),
+                                              std::pair(leading.p, leading.q)));
         });
     return result;
 }

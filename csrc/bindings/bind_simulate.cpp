@@ -42,7 +42,7 @@ py::tuple simulate_model(double gain, const ComplexArray& poles, const ComplexAr
     const std::span<const double> in = view(input);
     const double* const start = initial_state.size() == 0 ? nullptr : initial_state.data();
     {
-        const py::gil_scoped_release release;
+        const ReleasedGil released;
         if (arithmetic == "double") simulate<double>(g, in, clock.period, loop, start, w, u);
         else if (arithmetic == "float") simulate_in_float(g, in, clock.period, loop, start, w, u);
         else simulate_mirrored(g, in, clock, loop, start, arithmetic, w, u);

@@ -39,6 +39,23 @@ struct PyRecord {
     void close(const gaident::Loop& loop);
 };
 
+// The GIL, released until the end of the block.
+// As py::gil_scoped_release, but where the interpreter ends meanwhile (a daemon thread), this thread stops here for ever, and the process
+// ends without it: CPython would unwind the thread's stack, and the C++ frames on it would end the process by abort.
+class ReleasedGil {
+public:
+    ReleasedGil() : state_(PyEval_SaveThread()) {}
+    ~ReleasedGil();
+    ReleasedGil(const ReleasedGil&) = delete;
+    ReleasedGil& operator=(const ReleasedGil&) = delete;
+
+private:
+    PyThreadState* state_;
+};
+
+// A Python function's answer, asked from C++ frames: of an interpreter that ends meanwhile, as ReleasedGil.
+py::object asked(const py::function& function, const py::tuple& arguments);
+
 // Runs `work` on a thread of its own with the GIL released; every 50 ms looks for Ctrl-C (sets `stop`, waits for the work to end,
 // raises KeyboardInterrupt) and calls `tick`.
 // A Python exception raised by `tick` stops the work likewise.

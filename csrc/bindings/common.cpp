@@ -26,6 +26,34 @@ ComplexArray zeros_of(const Factors<double>& f) {
 
 RealArray to_array(const std::vector<double>& v) { return RealArray(static_cast<py::ssize_t>(v.size()), v.data()); }
 
+namespace {
+
+// CPython ends a thread that asks for the GIL of an interpreter that is gone, by unwinding its stack (from 3.14 on it stops it, as here).
+[[noreturn]] void stand_still() {
+    for (;;) std::this_thread::sleep_for(std::chrono::hours(1));
+}
+
+}  // namespace
+
+ReleasedGil::~ReleasedGil() {
+    try {
+        PyEval_RestoreThread(state_);
+    } catch (...) {  // of C functions: no exception but that unwinding
+        stand_still();
+    }
+}
+
+py::object asked(const py::function& function, const py::tuple& arguments) {
+    PyObject* answer = nullptr;
+    try {
+        answer = PyObject_CallObject(function.ptr(), arguments.ptr());
+    } catch (...) {
+        stand_still();
+    }
+    if (answer == nullptr) throw py::error_already_set();
+    return py::reinterpret_steal<py::object>(answer);
+}
+
 void run_interruptibly(std::atomic<bool>& stop, const std::function<void()>& work, const std::function<void()>& tick) {
     std::exception_ptr error;
     std::mutex lock;
@@ -44,7 +72,7 @@ void run_interruptibly(std::atomic<bool>& stop, const std::function<void()>& wor
     std::exception_ptr interruption;
     for (bool running = true; running;) {
         {
-            const py::gil_scoped_release release;
+            const ReleasedGil released;
             std::unique_lock<std::mutex> guard(lock);
             running = !ended.wait_for(guard, std::chrono::milliseconds(50), [&] { return done; });
         }
@@ -64,7 +92,7 @@ void run_interruptibly(std::atomic<bool>& stop, const std::function<void()>& wor
 
 void run_interruptibly(std::atomic<bool>& stop, std::size_t samples, const std::function<void()>& work) {
     if (samples < 100000) {
-        const py::gil_scoped_release release;
+        const ReleasedGil released;
         work();
     } else {
         run_interruptibly(stop, work, [] {});

@@ -149,7 +149,7 @@ def message_of(error: GaidentError) -> Text:
 
 def checked_axis(axis: str) -> str:
     """`axis`, where it is "rotary" or "linear"; else raises SettingsError."""
-    if axis not in AXES:
+    if not isinstance(axis, str) or axis not in AXES:
         raise SettingsError(f"axis is {axis!r}: it must be one of {', '.join(map(repr, AXES))}")
     return axis
 

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import difflib
 import math
+import os
 from collections.abc import Iterable, Mapping
+from pathlib import Path
 
 from gaident.errors import GaidentError
 
@@ -21,6 +23,30 @@ def real_number(value: object, name: str, error: type[GaidentError], remedy: str
     if not math.isfinite(number):
         raise error(f"{name} is {value!r}: {remedy}")
     return number
+
+
+def above_zero(value: object, name: str, error: type[GaidentError], remedy: str) -> float:
+    """`value` as a finite float above 0, a bool left out; raises `error` naming `name`, the value and the remedy."""
+    if isinstance(value, bool) or not (number := real_number(value, name, error, remedy)) > 0.0:
+        raise error(f"{name} is {value!r}: {remedy}")
+    return number
+
+
+def yes_or_no(value: object, name: str, error: type[GaidentError]) -> bool:
+    """`value`, where it is True or False."""
+    if not isinstance(value, bool):
+        raise error(f"{name} is {value!r:.80}: give True or False")
+    return value
+
+
+def checked_path(value: object, name: str = "path", error: type[GaidentError] = GaidentError) -> Path:
+    """`value` as a Path; raises `error` naming `name`, the value and the remedy where it is no path."""
+    text = os.fspath(value) if isinstance(value, str | os.PathLike) else None
+    if not isinstance(text, str):
+        raise error(f"{name} is {value!r:.80}: give the file's name as str or pathlib.Path")
+    if "\0" in text:
+        raise error(f"{name} is {text!r:.80}: no file's name contains the character NUL; correct it")
+    return Path(text)
 
 
 def one_of(value: object, name: str, allowed: Iterable[str], error: type[GaidentError]) -> str:

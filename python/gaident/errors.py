@@ -6,6 +6,7 @@ Every message names the argument (or the file and the line), the offending value
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 
 from gaident.arguments import Argument, parts_of
@@ -21,6 +22,8 @@ __all__ = [
     "check_schema",
 ]
 
+_LINE_ENDS = re.compile(r"\s*[\r\n]+\s*")  # of an array that is shown, or of a text in a log
+
 
 class GaidentError(ValueError):
     """Base of everything gaident raises on wrong use; a ValueError.
@@ -35,7 +38,7 @@ class GaidentError(ValueError):
     message : object
         The message as it was given.
     marked : str
-        The message with its references to arguments, to be built into another one.
+        The message in one line, with its references to arguments, to be built into another one.
 
     Examples
     --------
@@ -49,7 +52,7 @@ class GaidentError(ValueError):
 
     def __init__(self, message: object = "") -> None:
         self.message = message
-        self.marked = str(message)
+        self.marked = _LINE_ENDS.sub(" ", str(message))
         super().__init__("".join(map(str, self.parts)))
 
     @property

@@ -200,7 +200,7 @@ class Cascade(Controller):
         if not 0.0 <= delay <= LONGEST_DELAY:
             raise ControllerError(f"delay is {delay:g}: give seconds, from 0 to {LONGEST_DELAY:g}")
         object.__setattr__(self, "delay", delay)
-        if self.interpolation not in INTERPOLATIONS:
+        if not isinstance(self.interpolation, str) or self.interpolation not in INTERPOLATIONS:
             raise ControllerError(f"interpolation is {self.interpolation!r}: give {' or '.join(map(repr, INTERPOLATIONS))}")
         if self.position is None and (self.velocity_feedforward != 0.0 or self.position_period is not None):
             given = "velocity_feedforward" if self.velocity_feedforward != 0.0 else "position_period"

@@ -18,8 +18,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from gaident.checks import real_number
 from gaident.data.record import CHANNELS, Record
-from gaident.data.signals.arrays import MINIMUM_SAMPLES, channel, positive_number
+from gaident.data.signals.arrays import MINIMUM_SAMPLES, channel, positive_number, sample_time
 from gaident.data.signals.decimation import low_passed
 from gaident.data.signals.lags import LagFit, coarse_lags, refine
 from gaident.errors import RecordError
@@ -30,6 +31,8 @@ __all__ = ["Alignment", "align"]
 
 _WIDER = 2.0  # no decision: times max_rate: bound of the rate in the fit; bounds of a fit
 _ANY = 50.0  # no decision: times max_rate: the bound of a second fit, where the first one ends at its bound; bounds of a fit
+MOST_APART = 1e5  # no decision: what an argument may be: one sample time in that of the other log
+FASTEST_RATE = 0.1  # no decision: what an argument may be: clocks whose rates differ by more are none
 _ORDER = ("velocity", "position", "command", "torque")
 
 
@@ -151,7 +154,10 @@ def align(
     >>> round(found.offset, 3), [name for name, values in found.record.channels()]
     (0.25, ['command', 'velocity', 'torque'])
     """
+    if not isinstance(rec, Record):
+        raise RecordError(f"rec is a {type(rec).__name__}: give a gaident.Record")
     theirs, their_dt = _channels(other, dt)
+    _check_wishes(rec.dt, their_dt, take, within, max_rate)
     mine = dict(rec.channels())
     first, second = _common(mine, theirs, on)
     limit = positive_number(max_rate, "max_rate", "", "give for example 1e-3")
@@ -190,7 +196,7 @@ def _channels(other: object, dt: float | None) -> tuple[dict[str, NDArray[np.flo
     if len({len(values) for values in found.values()}) != 1:
         listed = ", ".join(f"{name} {len(values)}" for name, values in found.items())
         raise RecordError(f"other: give channels of equal length ({listed or 'none is given'})")
-    return found, positive_number(dt, "dt", "s", "give the sample time of other in seconds")
+    return found, sample_time(dt, "give the sample time of other in seconds")
 
 
 def _common(mine: Mapping[str, object], theirs: Mapping[str, object], on: object) -> tuple[str, str]:
@@ -206,6 +212,28 @@ def _common(mine: Mapping[str, object], theirs: Mapping[str, object], on: object
     if not isinstance(pair, tuple) or len(pair) != 2 or pair[0] not in mine or pair[1] not in theirs:
         raise RecordError(f"on={on!r}: give a channel of rec ({', '.join(mine)}) and one of other ({', '.join(theirs)})")
     return str(pair[0]), str(pair[1])
+
+
+def _check_wishes(mine: float, theirs: float, take: object, within: object, max_rate: object) -> None:
+    """Raises RecordError for arguments that ask for nothing that can be done."""
+    if not mine / MOST_APART <= theirs <= mine * MOST_APART:
+        raise RecordError(
+            f"rec has dt={mine:g} s and other {theirs:g} s: logs whose sample times differ by more than {MOST_APART:g} show no "
+            "motion in common; check both"
+        )
+    if take is not None and (
+        isinstance(take, str) or not isinstance(take, Sequence) or not all(isinstance(t, str) for t in take)
+    ):
+        raise RecordError(f"take is {take!r:.80}: give a list of channels, or None")
+    if within is not None:
+        remedy = "give the lowest and the highest offset in seconds, or None"
+        if not isinstance(within, Sequence) or isinstance(within, str | bytes) or len(within) != 2:
+            raise RecordError(f"within is {within!r:.80}: {remedy}")
+        low, high = (real_number(value, "within", RecordError, remedy) for value in within)
+        if not low < high:
+            raise RecordError(f"within is {within!r:.80}: {remedy}")
+    if not positive_number(max_rate, "max_rate", "", "give for example 1e-3") <= FASTEST_RATE:
+        raise RecordError(f"max_rate is {max_rate!r}: give at most {FASTEST_RATE:g}, for example 1e-3")
 
 
 def _best(

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gaident.arguments import arg
-from gaident.checks import real_number
+from gaident.checks import real_number, yes_or_no
 from gaident.data.assemble import assemble, channels_of
 from gaident.data.clock import clock_of, common_clock, second_of
 from gaident.data.formats.delimited import TextOptions
@@ -93,6 +93,7 @@ def read_pieces(
     """
     wanted = wanted_of(columns, units, dt, **more)
     low, high = _bounds(start, stop)
+    yes_or_no(pieces, "pieces", ReadError)
     with open_log(path, TextOptions(delimiter, decimal, skip, encoding)) as table:
         stem = "" if is_frame(path) else Path(path).stem
         named = channels_of(table, wanted)

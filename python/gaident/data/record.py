@@ -20,6 +20,7 @@ from gaident.data.record_checks import (
     digest_of,
     equally_long,
     moved_channels,
+    readable,
     sample_at,
     sample_time,
     saved_fields,
@@ -131,13 +132,12 @@ class Record:
         notes: Sequence[str] = (),
     ) -> None:
         complete(velocity, command, torque, position_command)
-        if not isinstance(name, str):
-            raise RecordError(f"name={name!r} is no text; give a str")
+        name = readable(name)
         given = {key: value for key, value in zip(CHANNELS, (command, velocity, torque, position, position_command), strict=True)}
         channels = {key: None if values is None else channel(values, key) for key, values in given.items()}
         kind, line, dt = torque_kind(torque_is, channels["torque"]), torque_line(torque_log, channels["torque"]), sample_time(dt)
         said = (*texts(notes), *unwrapped(equally_long(channels), dt))
-        self._fill(dt, channels, name=str(name), torque_is=kind, torque_log=line, notes=said)
+        self._fill(dt, channels, name=name, torque_is=kind, torque_log=line, notes=said)
 
     def _fill(self, dt: float, channels: Mapping[str, NDArray[np.float64] | None], **about: Any) -> None:
         """Set the fields of this frozen object, unchecked."""

@@ -4,16 +4,17 @@ from __future__ import annotations
 
 import hashlib
 import math
-from collections.abc import Mapping, Sequence
+import re
+import sys
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from gaident.arguments import arg
 from gaident.axis import Text
 from gaident.checks import one_of
-from gaident.data.signals.arrays import MINIMUM_SAMPLES, channel, positive_number
+from gaident.data.signals.arrays import MINIMUM_SAMPLES, channel, sample_time
 from gaident.data.signals.decimation import decimated
 from gaident.data.signals.wraps import continued, wrapped_words
 from gaident.data.torque_kind import COMMANDED, MEAN, SAMPLE, TORQUE_KINDS, TORQUE_LOGS
@@ -42,9 +43,7 @@ TIME_SLACK = 1e-6  # no decision: rounding of two decimal numbers
 HASH_BLOCK = 1 << 18  # no decision: memory; values of a block
 
 
-def sample_time(dt: object) -> float:
-    """The sample time [s], once it is a number above 0. Raises RecordError."""
-    return positive_number(dt, "dt", "s", f"give the sample time in seconds, for example {arg('dt', '1e-3')}")
+_BYTES = re.compile("[\ud800-\udfff]")  # as Python reads bytes of a name: U+DC80 to U+DCFF
 
 
 def torque_kind(torque_is: object, torque: NDArray[np.float64] | None) -> str:
@@ -97,9 +96,16 @@ def _beside(command: NDArray[np.float64], position: NDArray[np.float64], period:
     return command + period * float(np.round((position[0] - command[0]) / period))
 
 
+def readable(name: object) -> str:
+    """The name as text that can be written: bytes of a file's name that are no UTF-8 as the letters that they are in Latin-1."""
+    if not isinstance(name, str):
+        raise RecordError(f"name={name!r} is no text; give a str")
+    return _BYTES.sub(lambda found: chr(ord(found[0]) - 0xDC00) if "\udc80" <= found[0] <= "\udcff" else "\ufffd", name)
+
+
 def texts(notes: Sequence[str]) -> tuple[str, ...]:
     """The notes, once they are texts. Raises RecordError."""
-    if isinstance(notes, str) or not all(isinstance(note, str) for note in notes):
+    if isinstance(notes, str) or not isinstance(notes, Iterable) or not all(isinstance(note, str) for note in notes):
         raise RecordError(f"notes={notes!r:.80} is no list of texts; give notes=[...] or leave it out")
     return tuple(notes)
 
@@ -128,8 +134,11 @@ def check_bounds(t0: object, t1: object) -> None:
     for key, value in (("t0", t0), ("t1", t1)):
         if isinstance(value, bool) or not isinstance(value, int | float | np.integer | np.floating):
             raise RecordError(f"between({t0!r}, {t1!r}): {key} is no number; give seconds")
-        if math.isnan(value):
+        if value != value:  # NaN; math.isnan fails for whole numbers beyond 1e308
             raise RecordError(f"between({t0!r}, {t1!r}): {key} is NaN; give seconds")
+    for key, value in (("t0", t0), ("t1", t1)):
+        if isinstance(value, int) and abs(value) > sys.float_info.max:
+            raise RecordError(f"between(...): {key} is a whole number beyond all times; give seconds")
     if not t0 < t1:  # type: ignore[operator]  # both are numbers
         raise RecordError(f"between({t0!r}, {t1!r}): t0 must be before t1; exchange them")
 

@@ -8,11 +8,11 @@ from dataclasses import dataclass, field, fields
 from typing import Any
 
 from gaident.arguments import arg
-from gaident.checks import one_of
+from gaident.checks import one_of, yes_or_no
 from gaident.data.formats.table import Column, LogTable
 from gaident.data.formats.units import QUANTITIES, Constants, factor, is_any_unit
 from gaident.data.record import CHANNELS
-from gaident.data.signals.arrays import positive_number
+from gaident.data.signals.arrays import positive_number, sample_time
 from gaident.data.signals.decimation import factor_of
 from gaident.data.torque_kind import SAMPLE, TORQUE_KINDS, TORQUE_LOGS
 from gaident.errors import ReadError
@@ -47,14 +47,15 @@ class Wanted:
                     f"{arg(argument, repr(value))} is no mapping; give for example {arg(argument, '...', 'velocity')}"
                 )
             _known(argument, value or ())
+        yes_or_no(self.measured, "measured", ReadError)
         self.constants.check()
         for quantity, unit in self.units.items():
             factor(quantity, unit, self.constants)
         if self.dt is not None:
-            positive_number(self.dt, "dt", "s", f"give the sample time in seconds, for example {arg('dt', '1e-3')}")
+            sample_time(self.dt)
         factor_of(self.decimate)
         if self.resample is not None:
-            positive_number(self.resample, "resample", "s", "give the sample time of the even axis in seconds")
+            sample_time(self.resample, "give the sample time of the even axis in seconds", "resample")
             if self.dt is not None:
                 raise ReadError("dt and resample are both given; resample takes the log's time stamps, leave dt out")
         self._check_gear()
@@ -90,6 +91,15 @@ class Wanted:
             )
 
 
+def _named(channels: object) -> tuple[str, ...]:
+    """The channels that `load_side` names. Raises ReadError for what names none."""
+    named = (channels,) if isinstance(channels, str) else tuple(channels) if isinstance(channels, Iterable) else (channels,)
+    for channel in named:
+        if not isinstance(channel, str):
+            raise ReadError(f"load_side is {channels!r:.80}: give the name of a channel, or a list of names")
+    return named
+
+
 def wanted_of(
     columns: Mapping[str, str | int | None] | None = None,
     units: Mapping[str, str | float] | None = None,
@@ -106,7 +116,7 @@ def wanted_of(
         units={} if units is None else units,
         dt=dt,
         constants=Constants(**constants),
-        load_side=(load_side,) if isinstance(load_side, str) else tuple(load_side),
+        load_side=_named(load_side),
         shift={} if shift is None else shift,
         **more,
     ).check()

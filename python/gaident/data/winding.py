@@ -9,8 +9,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from gaident.checks import real_number
 from gaident.control.filtering import filtered
-from gaident.data.signals.arrays import channel, positive_number
+from gaident.data.signals.arrays import channel, positive_number, sample_time
 from gaident.errors import RecordError
+from gaident.policy.table import POLICY
 
 __all__ = ["Winding"]
 
@@ -72,7 +73,10 @@ class Winding:
     def current(self, voltage: ArrayLike, velocity: ArrayLike, dt: float) -> Vector:
         """Return the current i of a voltage U that is held over each sample, and a velocity w.
 
-            i(n+1) = a i(n) + (1 - a) (U(n) - ke (w(n) + w(n+1))/2)/R,   a = exp(-R dt/L),   i(0) = (U(0) - ke w(0))/R
+            i(n+1) = a i(n) + (1 - a) (U(n) - ke (w(n) + w(n+1))/2)/R,   a = exp(-R dt/L)
+            i(0) = (U(0) - ke w(0))/R in motion, 0 at rest
+
+        A motor at rest, |ke w(0)| within `rest_emf` of the largest voltage, is one whose voltage begins at sample 0.
 
         Parameters
         ----------
@@ -120,16 +124,51 @@ class Winding:
         samples = self.inductance / (self.resistance * dt)  # of the time constant L/R
         return np.asarray(self.torque_constant * (steady + (current - steady) * samples * -np.expm1(-1.0 / samples)))
 
+    def mean_current(self, current: ArrayLike, dt: float) -> Vector:
+        """Return the mean over each sample of a current that was sampled at its ends, under a voltage held in between.
+
+            (g - a)/(1 - a) i(n) + (1 - g)/(1 - a) i(n+1),   a = exp(-R dt/L),   g = (1 - a) L/(R dt)
+
+        The current goes from i(n) to i(n+1) with the time constant L/R, whatever voltage and back-EMF are.
+        Without an inductance it jumps to i(n+1) at once; with a large one this is the mean of both.
+
+        Parameters
+        ----------
+        current : array_like, shape (n,)
+            i [A].
+        dt : float
+            Sample time [s].
+
+        Returns
+        -------
+        ndarray of shape (n,)
+            The mean current [A]; after the last sample it stays as it is.
+
+        Raises
+        ------
+        RecordError
+            An array that a Record would refuse, or a sample time that is not above 0.
+        """
+        i, dt = channel(current, "current"), sample_time(dt)
+        following = np.concatenate([i[1:], i[-1:]])
+        if self.inductance == 0.0:
+            return following
+        samples = self.inductance / (self.resistance * dt)
+        gone = -np.expm1(-1.0 / samples)  # 1 - a
+        share = (1.0 - gone * samples) / gone
+        return np.asarray(share * following + (1.0 - share) * i)
+
     def _currents(self, voltage: ArrayLike, velocity: ArrayLike, dt: float) -> tuple[Vector, Vector, float]:
         """(i(n), s(n) that it goes to, dt), checked."""
         U, w = channel(voltage, "voltage"), channel(velocity, "velocity")
-        dt = positive_number(dt, "dt", "s", "give the sample time in seconds")
+        dt = sample_time(dt)
         if len(U) != len(w):
             raise RecordError(f"voltage has {len(U)} samples, velocity {len(w)}: give them of the same samples")
         towards = (U - 0.5 * self.emf * (w + np.concatenate([w[1:], w[-1:]]))) / self.resistance
         if self.inductance == 0.0:
             return (U - self.emf * w) / self.resistance, towards, dt
         a = float(np.exp(-self.resistance * dt / self.inductance))
-        first = (U[:1] - self.emf * w[:1]) / self.resistance
+        at_rest = abs(self.emf * w[0]) <= POLICY.rest_emf * float(np.abs(U).max())
+        first = np.zeros(1) if at_rest else (U[:1] - self.emf * w[:1]) / self.resistance
         more = filtered(np.array([1.0 - a]), np.array([1.0, -a]), (towards[:-1] - first)[None, :], [len(U) - 1])[0]
         return np.concatenate([first, first + more]), towards, dt

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from gaident.arguments import arg
 from gaident.data.formats.table import LogTable
-from gaident.data.torque_kind import MEASURED
+from gaident.data.torque_kind import COMMANDED, MEASURED
 from gaident.data.wanted import Wanted
 from gaident.data.winding import Winding
 from gaident.errors import ReadError
@@ -23,7 +23,8 @@ ELECTRICAL = frozenset({"voltage", "current"})
 """Columns that are no channel of a record, but make its torque."""
 LAGS = (
     "The inductance L of the winding is not given, so its torque is made as if the current followed the voltage at once. The lag "
-    "L/R that it has in the motor looks like a filter of the velocity, or like a lag of the torque. Give the inductance [H]."
+    "L/R that it has in the motor looks like a filter of the velocity, or like a lag of the torque. Give the inductance [H]. "
+    "Until then the torque counts as commanded: the winding stands between it and the shaft, as an actuator does."
 )
 
 
@@ -45,7 +46,7 @@ def torque_of_winding(table: LogTable, wanted: Wanted, values: Mapping[str, Vect
             f"The winding was estimated from voltage, current and velocity: R = {R.value:.4g} +- {R.std:.2g} Ohm, back-EMF "
             f"constant {ke.value:.4g} +- {ke.std:.2g} V s/rad, taken as the torque constant."
         )
-        return found.torque_constant * current, kind, note
+        return found.torque_constant * found.mean_current(current, dt), kind, note
     if current is not None:
         raise ReadError(
             f"{table.path}: a current makes a torque with {arg('torque_constant', '...')} [N m/A], or with the voltage, from "
@@ -58,5 +59,5 @@ def torque_of_winding(table: LogTable, wanted: Wanted, values: Mapping[str, Vect
             f"{arg('resistance', '...')} [Ohm] and {arg('torque_constant', '...')} [N m/A], or name the current's column"
         )
     winding = Winding(known.resistance, known.torque_constant, known.inductance or 0.0, known.back_emf_constant)
-    note = "" if known.inductance is not None else LAGS
-    return winding.torque(voltage, values["velocity"], dt), kind, note
+    torque = winding.torque(voltage, values["velocity"], dt)
+    return (torque, kind, "") if known.inductance is not None else (torque, wanted.torque_is or COMMANDED, LAGS)

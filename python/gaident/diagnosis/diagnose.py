@@ -12,6 +12,7 @@ from gaident.axis import Text, say
 from gaident.control.controller import Controller, checked_controller
 from gaident.control.pi import bare_pi
 from gaident.data.record import Record
+from gaident.diagnosis.blas import one_thread
 from gaident.diagnosis.controller.as_read import in_terms_of_the_log, outliers_of_the_log
 from gaident.diagnosis.controller.driving import Driving, driving_of
 from gaident.diagnosis.controller.form_findings import loop_of
@@ -131,11 +132,7 @@ def diagnose(
     note = Note(progress)
     recorded = records_of(rec, "rec")
     apart = () if validation is None else records_of(validation, "validation")
-    import scipy.linalg  # noqa: F401  brings a BLAS of its own, to be limited too
-    from threadpoolctl import threadpool_limits
-
-    # A sum that several threads share is rounded otherwise with each number of them, and a search follows the last digit.
-    with threadpool_limits(1, user_api="blas"), np.errstate(over="ignore", invalid="ignore"):
+    with one_thread(), np.errstate(over="ignore", invalid="ignore"):
         given, lines = outliers_of_the_log(recorded, checked_controller(controller))
         asked = loop_of(given, checked_controller(controller))
         given = timed(given, asked.controller)
@@ -148,7 +145,7 @@ def diagnose(
     noise_std, asked_accuracy, ranges = noise_std_of(noise), accuracy_of(accuracy), expected_of(expected)
     if not isinstance(quick, bool):
         raise SettingsError(f"quick is {quick!r}: give True or False")
-    with threadpool_limits(1, user_api="blas"), np.errstate(over="ignore", invalid="ignore"):
+    with one_thread(), np.errstate(over="ignore", invalid="ignore"):
         note(0.01, "replaying the controller, and looking for its form where it does not fit")
         driving = driving_of(records, validating, asked, driven, origin)
         hit = {r.digest: outliers for r, outliers in zip(given, lines, strict=True)}

@@ -16,11 +16,10 @@ import os
 import re
 from collections.abc import Sequence
 from importlib.resources import files
-from pathlib import Path
 from typing import Any
 
 from gaident.axis import Text, checked_axis, said, say, velocity_unit
-from gaident.checks import real_number
+from gaident.checks import checked_path, real_number
 from gaident.control import core
 from gaident.control.pi import PI, checked_pi
 from gaident.errors import ModelError
@@ -47,8 +46,9 @@ def write_c(
     axis: str = "rotary",
 ) -> str:
     """Writes the file, where a path is given, and returns its text; see `Model.to_c`."""
+    path = None if path is None else checked_path(path, error=ModelError)
     if name is None:
-        name = "drive" if path is None else c_name(Path(path).stem)
+        name = "drive" if path is None else c_name(path.stem)
     text = c_source(model, dt, controller, name, substeps, axis)
     if path is not None:
         write_whole(path, text.encode())
@@ -84,7 +84,7 @@ def _checked(model: Model, dt: float, controller: PI | None, name: str, substeps
     if real_number(dt, "dt", ModelError, "give the sample time in s, > 0") <= 0.0:
         raise ModelError(f"dt is {dt:g}: give the sample time in s, > 0")
     checked_pi(controller, "C source is written")
-    if not re.fullmatch(r"[A-Za-z_][A-Za-z0-9_]*", name):
+    if not isinstance(name, str) or not re.fullmatch(r"[A-Za-z_][A-Za-z0-9_]*", name):
         raise ModelError(f"name is {name!r}: give what C takes as a name, letters, digits and _")
     own = [effect.name for effect in model.effects if effect.own]
     if own:

@@ -19,7 +19,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gaident.checks import real_number
+from gaident.checks import above_zero
+from gaident.data.signals.arrays import LONGEST, SHORTEST
 from gaident.errors import ModelError
 from gaident.models.effects_linear import LINEAR, Transfer
 from gaident.models.model import Model
@@ -78,9 +79,10 @@ def _chain(model: Model) -> Transfer:
 
 def _checked_step(model: Model, dt: float, pade: int | None) -> float:
 
-    step = real_number(dt, "dt", ModelError, "give the sample time in s, > 0")
-    if step <= 0.0:
-        raise ModelError(f"dt is {step:g}: give the sample time in s, > 0")
+    remedy = f"give the sample time in s, from {SHORTEST:g} to {LONGEST:g}"
+    step = above_zero(dt, "dt", ModelError, remedy)
+    if not SHORTEST <= step <= LONGEST:
+        raise ModelError(f"dt is {step:g}: {remedy}")
     if pade is not None:
         raise ModelError(f"pade is {pade!r}: sampled, the delay is exact; leave pade out, or dt for a continuous system")
     if model.p == 0:

@@ -41,8 +41,10 @@ def checked_records(rec: Record | Sequence[Record], controller: Controller | Non
     return records
 
 
-def check_numbers(trials: object, seed: object, workers: object) -> None:
-    """Raises SettingsError where one is no whole number in its range; workers may be None."""
+def check_numbers(trials: object, seed: object, workers: object, progress: object) -> None:
+    """Raises SettingsError where one is no whole number in its range, workers may be None, or progress is no function."""
+    if progress is not None and not callable(progress):
+        raise SettingsError(f"progress is {progress!r:.80}: give a function of (fraction, message), or None")
     for name, value, low, high in (("trials", trials, 1, 10**6), ("seed", seed, 0, 2**63 - 1), ("workers", workers, 1, 1024)):
         if value is None and name == "workers":
             continue

@@ -127,7 +127,7 @@ def identify(
         raise SettingsError(f"settings is {settings!r}: give a gaident.Settings")
     looped = looped_over(checked, simplest(numbers.controller, (r.dt for r in checked)), space, settings.initial_state != "free")
     given, loop = looped.records, looped.controller
-    check_numbers(trials, seed, workers)
+    check_numbers(trials, seed, workers, progress)
     check_arithmetic(settings, loop)
     threads = _processors() if workers is None else int(workers)
     digests = distinct(given)

@@ -24,6 +24,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gaident.arguments import A_CONTROLLER, NO_CONTROLLER
+from gaident.checks import yes_or_no
 from gaident.control.pi import PI, checked_pi
 from gaident.data.record import Record
 from gaident.errors import RecordError, SettingsError
@@ -164,6 +165,8 @@ def least_squares(
     if not isinstance(rec, Record):
         raise RecordError(f"rec is {type(rec).__name__}: give a gaident.Record")
     checked_pi(controller, "equation (7) is")
+    yes_or_no(instruments, "instruments", SettingsError)
+    yes_or_no(whitening, "whitening", SettingsError)
     lowest = 1 if controller is None else 2
     if isinstance(order, bool) or not isinstance(order, Integral) or order < lowest:
         more = "" if controller is None else " + 1"

@@ -12,6 +12,8 @@ from gaident.errors import SettingsError
 
 __all__ = ["m_sequence"]
 
+LONGEST_HOLD = 1_000_000  # no decision: what an argument may be: samples
+
 # Taps t of primitive polynomials x^n + x^t + ... + 1 by register length n, fewest taps and smallest first
 # (E. J. Watson, "Primitive polynomials (mod 2)", Math. Comp. 16, 1962).
 TAPS: dict[int, tuple[int, ...]] = {
@@ -64,8 +66,8 @@ def m_sequence(register: int, amplitude: float = 1.0, hold: int = 1, offset: flo
     lengths = f"{min(TAPS)} to {max(TAPS)}"
     if isinstance(register, bool) or not isinstance(register, Integral) or int(register) not in TAPS:
         raise SettingsError(f"register is {register!r}: give a whole number of bits from {lengths}")
-    if isinstance(hold, bool) or not isinstance(hold, Integral) or hold < 1:
-        raise SettingsError(f"hold is {hold!r}: give a whole number of samples, 1 or more")
+    if isinstance(hold, bool) or not isinstance(hold, Integral) or not 1 <= hold <= LONGEST_HOLD:
+        raise SettingsError(f"hold is {hold!r}: give a whole number of samples, from 1 to {LONGEST_HOLD}")
     n, samples = int(register), 2 ** int(register) - 1
     if isinstance(seed, bool) or not isinstance(seed, Integral) or not 1 <= seed <= samples:
         raise SettingsError(f"seed is {seed!r}: give a whole number from 1 to {samples}")

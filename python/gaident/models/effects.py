@@ -18,7 +18,7 @@ from gaident.axis import TURN, Text, say, unit
 from gaident.checks import known_keys, one_of, real_number
 from gaident.errors import ModelError
 from gaident.models.effect_rows import SIDES, Row, Table
-from gaident.models.own_effects import OWN, PLACES, Function, Own, Parameter, Signals, checked
+from gaident.models.own_effects import OWN, PLACES, Function, Own, Parameter, Signals, check_kinds, checked
 
 __all__ = ["Effect", "Parameter", "Row", "Signals", "Table", "register", "table", "unregister"]
 
@@ -160,6 +160,7 @@ def register(
     (Effect('fan', {'coefficient': 1e-06}),)
     >>> ga.effects.unregister("fan")
     """
+    check_kinds(name, parameters, replace)
     given = {"command": command, "torque": torque, "friction": friction, "actuator": actuator, "sensor": sensor}
     chosen = {acts: function for acts, function in given.items() if function is not None}
     if len(chosen) != 1:
@@ -358,7 +359,10 @@ def ordered(effects: Iterable[Effect]) -> tuple[Effect, ...]:
 
 def checked_effects(effects: Iterable[Effect], p: int, q: int) -> tuple[Effect, ...]:
     """Effects in their order, where a model with p and q can carry them; raises ModelError."""
-    found = ordered(effects)
+    given = list(effects) if isinstance(effects, Iterable) and not isinstance(effects, str | bytes | Mapping) else None
+    if given is None or not all(isinstance(effect, Effect) for effect in given):
+        raise ModelError(f"effects is {effects!r:.80}: give a list of gaident.Effect, or use with_effect(name, ...)")
+    found = ordered(given)
     in_series = next((effect.name for effect in found if effect.row.place == "plant"), None)
     if found and p == 0:
         raise ModelError(

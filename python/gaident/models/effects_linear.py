@@ -7,8 +7,9 @@ from itertools import zip_longest
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
+from gaident.errors import ModelError
 from gaident.models.roots import quadratic_roots
 
 __all__ = ["LINEAR", "Transfer", "response_of"]
@@ -55,11 +56,19 @@ LINEAR: dict[str, Callable[[Sequence[float]], Transfer]] = {
 """Effect -> its transfer function, from its parameters in the order of the table."""
 
 
+def frequencies(omega: ArrayLike) -> NDArray[np.float64]:
+    """`omega` [rad/s] as an array; raises ModelError for what is no number and no array of numbers."""
+    try:
+        return np.asarray(omega, dtype=np.float64)
+    except (TypeError, ValueError, OverflowError):
+        raise ModelError(f"omega is {omega!r:.80}: give frequencies in rad/s") from None
+
+
 def response_of(parts: Sequence[Transfer], omega: NDArray[np.float64]) -> NDArray[np.complex128]:
     """Product of the parts at j omega [rad/s], of the shape of omega; not finite where that is a pole."""
-    s = 1j * omega
-    response = np.exp(-s * sum(part.delay for part in parts))
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+        s = 1j * omega
+        response = np.exp(-s * sum(part.delay for part in parts))
         for part in parts:
             response *= part.gain
             # Zero over pole in turn, so that no partial product leaves the range of the numbers.

@@ -94,6 +94,8 @@ def factor_parameters(model: Model) -> tuple[tuple[str, ...], NDArray[np.float64
     >>> list(zip(names, values.tolist(), units))
     [('gain', 500.0, 'rad/s^2/(N m)'), ('pole_1', 5.0, 'rad/s')]
     """
+    if not all(hasattr(model, name) for name in ("gain", "poles", "zeros", "p")):
+        raise ModelError(f"model is a {type(model).__name__}: give a gaident.Model")
     names, values, units = ["gain"], [model.gain], [gain_unit(model.p)]
     for kind, roots in (("pole", model.poles), ("zero", model.zeros)):
         for i, root in enumerate((r for r in roots if r.imag == 0.0), start=1):

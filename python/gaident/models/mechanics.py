@@ -152,8 +152,11 @@ class TwoMass:
         """Return the factored model (equation 5), p = 1 and q = 2; raise ModelError where a mass has no inertia."""
         if self.JM == 0.0 or self.JL == 0.0:
             raise ModelError(f"JM is {self.JM:g} and JL is {self.JL:g}: without inertia there is no two-mass model")
-        c = two_mass.coefficients_of_mechanics(self._vector())
-        return Model(c[0], polynomial_roots(c[1:4]), polynomial_roots(c[4:6]))
+        with np.errstate(all="ignore"):  # numbers so far apart that the equations overflow are told as what they make
+            c = two_mass.coefficients_of_mechanics(self._vector())
+            if not np.all(np.isfinite(c)):
+                raise ModelError(f"{self}: a coefficient of its transfer function is beyond all numbers; correct the values")
+            return Model(c[0], polynomial_roots(c[1:4]), polynomial_roots(c[4:6]))
 
     @classmethod
     def from_model(cls, model: Model, free_shaft_damping: bool = False) -> TwoMass:
@@ -270,6 +273,8 @@ def mechanics_from_model(model: Model, covariance: ArrayLike | None = None) -> M
     >>> round(found.JL, 6), round(found.KG, 3), found.physical
     (0.0006, 2.6, True)
     """
+    if not isinstance(model, Model):
+        raise ModelError(f"model is a {type(model).__name__}: give a gaident.Model")
     cov = _checked_covariance(model, covariance)
     if (model.p, model.q) == (1, 0):
         return _one_mass(model, cov)
@@ -352,7 +357,10 @@ def _checked_covariance(model: Model, covariance: ArrayLike | None) -> Matrix | 
     if covariance is None:
         return None
     n = FactorCounts.of(model).size
-    cov = np.array(covariance, dtype=np.float64)
+    try:
+        cov = np.array(covariance, dtype=np.float64)
+    except (TypeError, ValueError, OverflowError):
+        raise ModelError(f"covariance is {covariance!r:.80}: give {n} x {n} numbers, or None") from None
     if cov.shape != (n, n):
         raise ModelError(
             f"covariance has the shape {cov.shape}: this model has {n} natural parameters, "

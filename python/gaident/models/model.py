@@ -18,7 +18,7 @@ from gaident.control.pi import PI, checked_pi
 from gaident.errors import ModelError
 from gaident.models.discrete import Discrete, require_strictly_proper
 from gaident.models.effects import Effect, checked_effects
-from gaident.models.effects_linear import LINEAR, Transfer, response_of
+from gaident.models.effects_linear import LINEAR, Transfer, frequencies, response_of
 from gaident.models.roots import Mode, canonical_roots, modes_of, roots_of, text_of
 from gaident.providers import provided
 
@@ -221,7 +221,7 @@ class Model:
         """
         self._require_linear("frequency_response")
         parts = Transfer(self.gain, self.poles, self.zeros), *(LINEAR[e.name](e.values) for e in self.effects)
-        return response_of(parts, np.asarray(omega, dtype=np.float64))
+        return response_of(parts, frequencies(omega))
 
     def discrete(self, dt: float, controller: PI | None = None) -> Discrete:
         """Return the difference equation (7) from command to velocity; without a controller from torque to velocity.

@@ -13,17 +13,18 @@ of second order), once per step of the controller at command and actuator; `regi
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from gaident.checks import yes_or_no
 from gaident.errors import ModelError
 from gaident.policy.table import POLICY
 
-__all__ = ["OWN", "PLACES", "Function", "Own", "Parameter", "Signals", "checked", "starts"]
+__all__ = ["OWN", "PLACES", "Function", "Own", "Parameter", "Signals", "check_kinds", "checked", "starts"]
 
 Signal = NDArray[np.float64]
 Function = Callable[..., Any]
@@ -142,6 +143,17 @@ class Own:
                 "choices are numpy's where(), minimum(), maximum()"
             ) from reason
 
+    def refuse(self, answer: object, time: float) -> None:
+        """What the core calls where a function answers what none may: nothing, or a friction that pushes."""
+        if answer is None:
+            raise ModelError(
+                f"the effect {self.name!r}: its function returns None at {time:g} s: return an array of numbers always"
+            )
+        raise ModelError(
+            f"the effect {self.name!r}: its friction is {answer:g} at {time:g} s: it is the size of a torque against the motion, "
+            "return numbers >= 0, as numpy.abs() or maximum(..., 0) give"
+        )
+
     def neutral(self, values: Sequence[float]) -> bool:
         """Whether these values make it the identity."""
         return all(math.isnan(p.neutral) or v == p.neutral for p, v in zip(self.parameters, values, strict=True))
@@ -163,6 +175,15 @@ def starts(p: Parameter, count: int = POLICY.own_values) -> tuple[float, ...]:
     # no decision: a start
     kept = tuple(v for v in values if abs(v - p.neutral) > 0.01 * span or math.isnan(p.neutral))
     return kept or (p.lowest + 0.75 * span,)
+
+
+def check_kinds(name: object, parameters: object, replace: object) -> None:
+    """Raises ModelError where what `register` is given is of another kind."""
+    if not isinstance(name, str):
+        raise ModelError(f"name is {name!r:.80}: give the effect's name as text")
+    if not isinstance(parameters, Iterable) or isinstance(parameters, str | bytes | Mapping):
+        raise ModelError(f"parameters of {name} is {parameters!r:.80}: give a list of gaident.effects.Parameter")
+    yes_or_no(replace, "replace", ModelError)
 
 
 def checked(own: Own) -> Own:
@@ -249,6 +270,8 @@ def _answer(own: Own, signals: Mapping[str, Signal], values: Sequence[Signal]) -
     for view in views:
         view.setflags(write=False)
     found = own.ask(w, theta, u, r, 0.25, *given)
+    if found is None:
+        own.refuse(None, 0.25)
     try:
         answer = np.asarray(found, dtype=np.float64)
     except (TypeError, ValueError):

@@ -59,7 +59,7 @@ def canonical_roots(roots: object, name: str) -> tuple[complex, ...]:
         raise ModelError(f"{name} is {roots!r}: give a list of numbers in rad/s")
     try:
         values = np.atleast_1d(np.asarray(roots, dtype=np.complex128))
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         raise ModelError(f"{name} is {roots!r}: give a list of numbers in rad/s") from None
     if values.ndim != 1:
         raise ModelError(f"{name} has the shape {values.shape}: give a list of numbers in rad/s")

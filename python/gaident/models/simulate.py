@@ -15,7 +15,16 @@ from gaident.data.record import Record
 from gaident.errors import ModelError
 from gaident.models.model import Model
 from gaident.models.simulate_many import simulated_with_effects
-from gaident.models.simulation_input import AnyModel, Signal, as_model, check_start, checked_substeps, core_record, input_of
+from gaident.models.simulation_input import (
+    AnyModel,
+    Signal,
+    as_model,
+    check_start,
+    checked_substeps,
+    core_record,
+    input_of,
+    states_of,
+)
 
 ARITHMETICS = ("double", "float", "drive_double", "drive_float", "c30", "fixed", "fixed_tight", "fixed_wide")
 
@@ -226,7 +235,7 @@ def _simulated(
     plant = as_model(model)
     one_of(arithmetic, "arithmetic", ARITHMETICS, ModelError)
     source, what = input_of(plant, rec, controller)
-    start = np.zeros(0) if state is None else np.array(state, dtype=np.float64)
+    start = np.zeros(0) if state is None else states_of(state, "initial_state")
     if state is not None:
         check_start(plant, controller, start, what)
     steps = checked_substeps(substeps)

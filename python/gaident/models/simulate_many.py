@@ -22,12 +22,14 @@ from gaident.models.own_effects import OWN
 from gaident.models.simulation_input import (
     AnyModel,
     Signal,
-    as_model,
     check_start,
+    check_workers,
     checked_substeps,
     core_record,
     input_for,
     input_of,
+    models_of,
+    states_of,
 )
 
 OwnList = list[tuple[str, Callable[..., Any], Signal]]
@@ -79,14 +81,15 @@ def simulate_many(
     >>> ga.simulate_many([ga.OneMass(J, 0.0) for J in (1e-3, 2e-3)], rec)[:, -1].round(6).tolist()
     [19.8, 9.9]
     """
-    plants = [as_model(model) for model in models]
+    plants = models_of(models)
+    check_workers(workers)
     source, starts = None, np.zeros((0, 0))
     for structure in {(plant.p, plant.q): plant for plant in plants}.values():
         source, _ = input_of(structure, rec, controller)
     if source is None:
         return np.zeros((0, len(rec)))
     if initial_states is not None:
-        starts = np.array(initial_states, dtype=np.float64)
+        starts = states_of(initial_states, "initial_states")
         if starts.ndim != 2 or len(starts) != len(plants):
             raise ModelError(f"initial_states has the shape {starts.shape}: give one row per model, {len(plants)}")
         for i, plant in enumerate(plants):

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Mapping
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -67,6 +69,30 @@ def input_for(p: int, rec: Record, controller: Controller | None) -> tuple[Signa
             f"{TORQUE}, or {A_CONTROLLER} to drive the loop with the command"
         )
     return held_torque(rec), "torque"
+
+
+MOST_WORKERS = 1024  # no decision: what an argument may be: threads
+
+
+def states_of(value: object, name: str) -> Signal:
+    """States of a start as an array of its own; raises ModelError for what is no array of numbers."""
+    try:
+        return np.array(value, dtype=np.float64)
+    except (TypeError, ValueError, OverflowError):
+        raise ModelError(f"{name} is {value!r:.80}: give numbers, as gaident.initial_state does") from None
+
+
+def models_of(models: object) -> list[Model]:
+    """What is given as several models, as a list; raises ModelError for what is none."""
+    if not isinstance(models, Iterable) or isinstance(models, str | bytes | Mapping):
+        raise ModelError(f"models is {models!r:.80}: give a list of models")
+    return [as_model(model) for model in models]
+
+
+def check_workers(workers: object) -> None:
+    """Raises ModelError for what is no number of threads."""
+    if isinstance(workers, bool) or not isinstance(workers, int) or not 1 <= workers <= MOST_WORKERS:
+        raise ModelError(f"workers is {workers!r:.80}: give a number of threads, from 1 to {MOST_WORKERS}")
 
 
 def check_start(plant: Model, controller: Controller | None, start: Signal, what: str) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from gaident.policy.declared import DRIVES, ENCODER, LOOP, REAL, REGRESSION, SAMPLED, SHORT, SLOWER, SUCCESS, record
+from gaident.policy.declared import DRIVES, ENCODER, LOOP, REAL, REGRESSION, SAMPLED, SHORT, SLOWER, SUCCESS, WINDING, record
 
 __all__ = ["Records"]
 
@@ -24,6 +24,7 @@ class Records:
     near_rpm: float = record(1.25, "1", "factor within which their ratio is that of rpm to rad/s: one of them is in rpm", SUCCESS)
     repeats: float = record(0.9, "1", "share of differences that are not 0: below, a velocity is quantised", DRIVES)
     rest_steps: float = record(1.5, "steps", "of that quantisation: a first velocity above is no rest", DRIVES)
+    rest_emf: float = record(0.01, "1", "of the largest voltage: a motor whose first back-EMF is less starts at rest", WINDING)
     rest_share: float = record(0.6, "1", "of the first command: a first velocity up to it is the response from rest", SUCCESS)
     outlier_far: float = record(9.0, "1", "standard deviations from its neighbours, from which a sample may be an outlier", LOOP)
     outlier_missed: float = record(0.4, "1", "of that distance, by which the lines from either side, and a model, miss it", LOOP)

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gaident.axis import checked_axis, message_of
+from gaident.checks import yes_or_no
 from gaident.control.pi import bare_pi
 from gaident.data.record import Record
 from gaident.diagnosis.explain.evidence import velocity_curve
@@ -109,6 +110,9 @@ def report_page(
     """The text of what `report` writes."""
     from plotly.offline import get_plotlyjs
 
+    if about is not None and not isinstance(about, Mapping):
+        raise GaidentError(f"about is {about!r:.80}: give a dictionary of texts, for example {{'machine': 'press 4'}}")
+    yes_or_no(live, "live", GaidentError)
     for key, value in (about or {}).items():
         if not isinstance(value, str):
             raise GaidentError(f"about: {key} is {value!r}: give text")

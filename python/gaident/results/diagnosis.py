@@ -223,7 +223,7 @@ class Diagnosis(SavedResult):
         str
             Verdict, causes, gain, what to measure next, and what could not be tested.
         """
-        return str(provided("diagnosis_summary")(self, axis or self.axis, units))
+        return str(provided("diagnosis_summary")(self, self.axis if axis is None else axis, units))
 
     def plot(self, records: Record | Sequence[Record] | None = None, axis: str | None = None) -> Figure:
         """Draw what is wrong and what is left.
@@ -248,7 +248,7 @@ class Diagnosis(SavedResult):
             For another axis.
         """
         given = self._drawn(records, "plot")
-        return picture("plot_diagnosis", self, given, axis or self.axis)
+        return picture("plot_diagnosis", self, given, self.axis if axis is None else axis)
 
     def plot_bode(self, records: Record | Sequence[Record] | None = None, hz: bool = False, axis: str | None = None) -> Figure:
         """Draw the extended model against the frequency response of the longest record, with coherence.
@@ -277,7 +277,8 @@ class Diagnosis(SavedResult):
             Where they show no frequency response.
         """
         given = self._drawn(records, "plot_bode")
-        return picture("plot_bode", self.model, self.controller, tuple(map(self.as_used, given)), hz, axis or self.axis)
+        shown = tuple(map(self.as_used, given))
+        return picture("plot_bode", self.model, self.controller, shown, hz, self.axis if axis is None else axis)
 
     def _repr_html_(self) -> str:
         """What a notebook shows."""

@@ -14,6 +14,7 @@ from gaident.axis import linear_sentences, restored
 from gaident.checks import real_number
 from gaident.control.pi import PI
 from gaident.data.record import Record
+from gaident.data.signals.arrays import LARGEST
 from gaident.errors import SettingsError
 from gaident.providers import provided
 
@@ -57,11 +58,11 @@ class Limits:
     def __post_init__(self) -> None:
         for limit in fields(self):
             value = getattr(self, limit.name)
-            if limit.name == "travel" and value == math.inf:
+            if limit.name == "travel" and isinstance(value, float) and value == math.inf:
                 continue
             number = real_number(value, limit.name, SettingsError, "give one number > 0")
-            if number <= 0.0:
-                raise SettingsError(f"{limit.name} is {number:g}: give one number > 0")
+            if not 0.0 < number <= LARGEST:
+                raise SettingsError(f"{limit.name} is {number:g}: give one number > 0, and at most {LARGEST:g}")
             object.__setattr__(self, limit.name, number)
 
     @classmethod

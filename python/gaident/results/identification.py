@@ -166,7 +166,8 @@ class Identification(SavedResult):
 
     def residual(self, rec: Record) -> NDArray[np.float64]:
         """Return measured minus simulated velocity [rad/s], shape (n,)."""
-        return rec.velocity - self.simulate(rec)
+        simulated = self.simulate(rec)  # which looks at `rec`
+        return rec.velocity - simulated
 
     def summary(self, axis: str = "rotary", units: Mapping[str, str | float] | None = None) -> str:
         """Return the result as text.
@@ -301,6 +302,8 @@ class Identification(SavedResult):
         """
         check_schema(data, SCHEMA, SCHEMA_VERSION)
         with undamaged(cls.KIND):
+            if "gain" not in data["parameters"]:
+                raise GaidentError("parameters lacks gain, which every model has; save it again")
             return cls(
                 model=Model.from_dict(data["model"]),
                 controller=None if data["controller"] is None else controller_of(data["controller"]),

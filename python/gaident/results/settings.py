@@ -128,8 +128,9 @@ class Settings:
             ("arithmetic", ARITHMETICS),
             ("initial_state", INITIAL_STATES),
         ):
-            if getattr(self, name) not in allowed:
-                raise SettingsError(f"{name} is {getattr(self, name)!r}: it must be one of {', '.join(map(repr, allowed))}")
+            value = getattr(self, name)
+            if not isinstance(value, str) or value not in allowed:
+                raise SettingsError(f"{name} is {value!r}: it must be one of {', '.join(map(repr, allowed))}")
 
     @classmethod
     def paper(cls) -> Settings:

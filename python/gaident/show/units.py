@@ -44,6 +44,8 @@ def scales_of(units: Mapping[str, str | float] | None, axis: str) -> Scales:
     """
     if units is None:
         return {}
+    if not isinstance(units, Mapping):
+        raise SettingsError(f"units is {units!r:.80}: give a dictionary, for example {{'velocity': 'rpm'}}")
     named = [f.name for f in fields(Constants)]
     for key in units:
         one_of(key, "units: the quantity", (*_SI, *named), SettingsError)

@@ -47,6 +47,17 @@ def test_it_says_what_is_wrong_and_writes_files(here: Path, capsys: pytest.Captu
     assert "contains no identification" in refusal(["diagnose", "run0.csv", *LOOP, "--model", "dia.json"], capsys)
 
 
+def test_a_log_whose_name_is_no_utf_8(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Named in Latin-1: it ended as an internal error behind all the work."""
+    os.rename("run0.csv", b"Achse_\xe9.csv")
+    (log,) = (name for name in os.listdir() if name.startswith("Achse"))
+    names = ("--out", "dia.json", "--plot", "dia.png", "--report", "page.html")
+    assert main(["diagnose", log, *LOOP, *names]) == 0
+    out, err = capsys.readouterr()
+    assert err == "" and out.endswith("written: dia.json, dia.png, page.html\n")
+    assert "Achse_é" in Path("page.html").read_text(encoding="utf-8")
+
+
 def test_what_was_found_outside_of_an_expected_range_is_said(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """A range of the drive file bounds no search; of a resonance that is not there nothing is said."""
     told = "The inertia was found as"

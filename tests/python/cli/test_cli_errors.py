@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import importlib
 import os
 import pickle
+import resource
 import subprocess
 from pathlib import Path
 
@@ -141,16 +143,19 @@ def test_what_cannot_be_written_is_1(here: Path, capsys: pytest.CaptureFixture[s
         assert done.stderr.splitlines()[0] == "gaident: No space left on device"
 
 
-def test_failure_of_writing_bears_the_users_name(
-    here: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    def full(*_: object) -> None:
-        raise OSError(28, "No space left on device", ".idn.png.part")
-
-    monkeypatch.setattr(Path, "write_bytes", full)
-    err = refusal(["identify", "step.csv", *NAMES, *LOOP, "--plot", "idn.png"], capsys, 1)
-    assert err == "gaident: cannot write idn.png: No space left on device\n"
-    assert [p.name for p in here.iterdir()] == ["step.csv"]
+def test_failure_of_writing_bears_the_users_name(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """The system's own limit on a file's size ends the write in its middle, as a full disk does, whatever function writes."""
+    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
+    Path("idn.png").write_bytes(b"old")
+    importlib.import_module("matplotlib.font_manager")  # its cache is no part of this
+    resource.setrlimit(resource.RLIMIT_FSIZE, (1000, hard))
+    try:
+        err = refusal(["identify", "step.csv", *NAMES, *LOOP, "--plot", "idn.png"], capsys, 1)
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
+    assert err == "gaident: cannot write idn.png: File too large\n"
+    assert Path("idn.png").read_bytes() == b"old"
+    assert sorted(p.name for p in here.iterdir()) == ["idn.png", "step.csv"]
 
 
 def test_a_bug_is_1_and_no_traceback(here: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:

@@ -91,16 +91,42 @@ def test_the_winding_is_estimated_from_voltage_current_and_velocity(log: dict[st
             list_.append(found.parameters[name].value)
         assert found.parameters["resistance"].std < 1e-3 * R and found.parameters["back_emf_constant"].std < 1e-3 * KE
         assert found.error < 0.1 and "resistance  0.8" in found.summary() and found.cutoff_hz <= 100.0
-    # The noise moves each by less than a thousandth; the mean is off by the central difference, which sees less of the
-    # slope of a current with a time constant below a sample, so that its inductance is too large: 16 %, and R 0.15 %.
-    for name, true, off, scatter in (("resistance", R, 2e-3, 3e-4), ("back_emf_constant", KE, 5e-4, 5e-4)):
+    # A time constant of 0.75 samples: a central difference of the current made the inductance 16 % too large, and R 0.15 %.
+    for name, true, off, scatter in (
+        ("resistance", R, 5e-4, 3e-4),
+        ("back_emf_constant", KE, 5e-4, 5e-4),
+        ("inductance", L, 5e-3, 5e-3),
+    ):
         assert abs(float(np.mean(values[name])) / true - 1.0) < off and float(np.std(values[name])) < scatter * true, name
-    assert float(np.mean(values["inductance"])) == pytest.approx(1.16 * L, rel=0.02)
     offset = ga.estimate_winding(log["voltage"] + 0.3, log["current"], log["velocity"], DT)
     assert offset.parameters["offset"].value == pytest.approx(0.3, abs=0.05)
     assert offset.winding.resistance == pytest.approx(R, rel=0.02)
     with pytest.raises(FrozenInstanceError):
         offset.error = 0.0  # type: ignore[misc]
+
+
+def test_an_inductance_that_the_samples_cannot_show_is_not_said() -> None:
+    """Of a time constant below an eighth of a sample, the current at the sample's end keeps less than a thousandth.
+
+    A central difference called it half a sample for certain, whatever it was; so did the deviation of L, which is a logarithm.
+    """
+    for inductance in (1e-7, 3e-5, 1e-4):
+        run = motor(friction=0.0, inductance=inductance)
+        for seed in range(4):
+            noise = 0.05 * np.random.default_rng(seed).standard_normal((2, len(VOLTAGE)))
+            found = ga.estimate_winding(run["voltage"], run["current"] + noise[0], run["velocity"] + noise[1], DT)
+            assert found.winding.inductance == 0.0, (inductance, seed)
+            told = found.parameters["inductance"]
+            assert not told.identifiable or abs(told.value - inductance) < 3.0 * told.std, (inductance, seed)
+            assert found.winding.resistance == pytest.approx(R, rel=0.01)
+
+
+def test_a_current_sampled_behind_the_step_of_its_voltage() -> None:
+    """Without an inductance, at the begin of each sample: U = R i + ke w of one instant."""
+    w = motor(friction=0.0)["velocity"]
+    found = ga.estimate_winding(VOLTAGE, (VOLTAGE - KE * w) / R, w, DT)
+    assert (found.winding.resistance, found.winding.emf) == pytest.approx((R, KE), rel=1e-3)
+    assert found.winding.inductance == 0.0 and not found.parameters["inductance"].identifiable
 
 
 def test_a_motion_that_does_not_tell() -> None:
@@ -145,6 +171,7 @@ def test_back_emf_apart_from_viscous_friction(here: Path) -> None:
     assert "The winding was estimated from voltage, current and velocity: R = 0." in estimated.notes[0]
     at_once = ga.read("motor.csv", {**COLUMNS, "voltage": "U"}, resistance=R, torque_constant=KT)
     assert "looks like a filter of the velocity, or like a lag of the torque" in at_once.notes[0] and known.notes == ()
+    assert at_once.torque_is == "commanded" and "the torque counts as commanded" in at_once.notes[0]
     viscous = {}
     for name, rec in (("voltage", by_volt), ("known", known), ("estimated", estimated), ("current", plain)):
         p = ga.inverse_dynamics(rec, terms=("inertia", "viscous", "coulomb")).parameters
@@ -164,7 +191,7 @@ def test_the_friction_behind_a_winding_over_several_noises(log: dict[str, NDArra
     """A winding's torque is the mean over the sample that follows, which a regression of instants sees half a sample early.
 
     Put on its instant, the dry friction of a known winding comes back within 0.5 %, else 11 % too large.
-    That of an estimated one is off by its inductance, that of a sampled current by what the current does between the samples.
+    That of an estimated one too; that of a sampled current is off by what the current does between the samples.
     """
     found: dict[str, list[tuple[float, float]]] = {}
     for seed in range(6):
@@ -176,7 +203,7 @@ def test_the_friction_behind_a_winding_over_several_noises(log: dict[str, NDArra
             rec = ga.Record(DT, velocity=w, torque=torque, torque_is="measured")
             p = ga.inverse_dynamics(rec, terms=("inertia", "viscous", "coulomb")).parameters
             found.setdefault(name, []).append((p["coulomb"].value / FRICTION, p["viscous"].value / D))
-    off = {"mean": (0.11, -0.20), "known": (0.0, 0.005), "estimated": (-0.03, 0.05), "current": (-0.03, 0.045)}
+    off = {"mean": (0.11, -0.20), "known": (0.0, 0.005), "estimated": (-0.005, 0.003), "current": (-0.03, 0.045)}
     for name, values in found.items():
         assert np.abs(np.mean(values, axis=0) - 1.0 - off[name]).max() < 0.01, (name, np.mean(values, axis=0))
         assert np.std(values, axis=0).max() < 0.01, name  # six noises agree: what is off is no chance
@@ -187,17 +214,49 @@ def centred(torque: NDArray[np.float64]) -> NDArray[np.float64]:
     return 0.5 * (torque + np.concatenate([torque[:1], torque[:-1]]))
 
 
+def test_without_its_inductance_the_winding_is_an_actuator_with_a_lag(here: Path) -> None:
+    """A velocity filter alone had the name, as no actuator was looked for in front of a torque that counted as measured."""
+    rec = ga.read("motor.csv", {**COLUMNS, "voltage": "U"}, resistance=R, torque_constant=KT)
+    dia = ga.diagnose(rec)
+    late = next(f for f in dia.findings if f.effect in ("torque_lag", "velocity_filter"))
+    assert dia.verdict == "explained" and {late.effect, *late.alternatives} == {"torque_lag", "velocity_filter"}
+    assert late.parameters["time_constant"].value == pytest.approx(L / R, rel=0.02)
+    assert dia.mechanics["inertia"].value == pytest.approx(J, rel=5e-3)
+    assert "coulomb_friction" in {f.effect for f in dia.findings}
+
+
+def test_the_torque_of_a_sampled_current_between_its_samples(here: Path) -> None:
+    """A current with a time constant of 0.75 samples is near its end value for most of a sample: neither the sample before,
+    nor the mean of both, is what drives the axis."""
+    run = motor(friction=0.0)
+    needed = J * np.diff(run["velocity"]) / DT + 0.5 * D * (run["velocity"][1:] + run["velocity"][:-1])
+
+    def off(mean: NDArray[np.float64]) -> float:
+        return float(np.sqrt(np.mean((KT * mean[:-1] - needed) ** 2) / np.mean(needed**2)))
+
+    i = run["current"]
+    winding = ga.Winding(R, KT, L)
+    assert off(winding.mean_current(i, DT)) < 5e-3
+    assert off(0.5 * (i + np.r_[i[1:], i[-1:]])) > 0.02 and off(i) > 0.1
+    np.testing.assert_array_equal(ga.Winding(R, KT).mean_current(i, DT), np.r_[i[1:], i[-1:]])
+    np.testing.assert_allclose(ga.Winding(R, KT, 1e3 * L).mean_current(i, DT)[:-1], 0.5 * (i[1:] + i[:-1]), rtol=0.0, atol=0.01)
+    rec = ga.read("motor.csv", {**COLUMNS, "voltage": "U", "current": "i"})
+    data = np.loadtxt("motor.csv", delimiter=",", skiprows=1)
+    found = ga.estimate_winding(data[:, 1] / 1e3, data[:, 2], rec.velocity, DT).winding
+    np.testing.assert_allclose(np.asarray(rec.torque), found.torque_constant * found.mean_current(data[:, 2], DT))
+
+
 def test_the_diagnosis_finds_the_friction_behind_the_winding(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
     Path("drive.toml").write_text(
         f"resistance = {R}\ntorque_constant = {KT}\ninductance = {L}\n[columns]\ntime = 't'\nvelocity = 'n'\nvoltage = 'U'\n"
     )
     assert main(["diagnose", "motor.csv", "--drive", "drive.toml", "--json"]) == 0
     data = json.loads(capsys.readouterr().out)
-    causes = {f["effect"]: f for f in data["findings"] if not f["is_noise"]}
-    assert "coulomb_friction" in causes, data["findings"]
-    torque = causes["coulomb_friction"]["parameters"]["torque"]
-    # 2.3 % too large with each of three noises, a quarter of the deviation that it states.
-    assert torque["value"] == pytest.approx(FRICTION, rel=0.04) and torque["std"] < 0.12 * FRICTION
+    (friction,) = (f for f in data["findings"] if not f["is_noise"])
+    assert data["verdict"] == "explained" and friction["effect"] == "coulomb_friction", data
+    torque = friction["parameters"]["torque"]
+    # Started with the current of a stalled motor, which the rig has not, it was "partly explained", with friction 4 % too large.
+    assert torque["value"] == pytest.approx(FRICTION, rel=5e-3) and torque["std"] < 5e-3 * FRICTION
     options = ["--columns", "time=t,velocity=n,voltage=U,current=i"]
     assert main(["identify", "motor.csv", *options]) == 0
     assert "The winding was estimated from voltage, current and velocity" in " ".join(capsys.readouterr().out.split())

@@ -111,13 +111,17 @@ def test_files_that_cannot_be_read_are_named(tmp_path: Path) -> None:
                           ("log.bin", r"log\.bin: is no text.*gaident\.read")):  # fmt: skip
         with pytest.raises(ga.GaidentError, match=message):
             ga.load(tmp_path / name)
-    with pytest.raises(ga.GaidentError, match="path=3 is no path"):
+    with pytest.raises(ga.GaidentError, match="path is 3: give the file"):
         ga.load(3)  # type: ignore[arg-type]
 
 
 def test_a_damaged_record_is_refused(saved: dict[str, Path], tmp_path: Path) -> None:
     data = json.loads(saved["record"].read_text())
-    for change, message in (({"dt": "x"}, "dt"), ({"velocity": [1.0]}, "samples|lengths"), ({"command": None}, "command")):
+    for change, message in (
+        ({"dt": "x"}, "dt"),
+        ({"velocity": [1.0]}, "velocity has 1 entries"),
+        ({"command": None}, "command"),
+    ):
         other = tmp_path / "record.json"
         other.write_text(json.dumps(data | change))
         with pytest.raises(ga.GaidentError, match=message):

@@ -54,7 +54,7 @@ class TextOptions:
                 raise ReadError(
                     f"{arg('delimiter', repr(self.delimiter))} cannot stand between columns; give ',', ';', 'tab', 'space' or '|'"
                 )
-        if self.decimal not in (None, ".", ","):
+        if self.decimal is not None and (not isinstance(self.decimal, str) or self.decimal not in (".", ",")):
             raise ReadError(f"{arg('decimal', repr(self.decimal))} is no decimal mark; give '.' or ','")
         if self.skip is not None and (isinstance(self.skip, bool) or not isinstance(self.skip, int) or self.skip < 0):
             raise ReadError(f"{arg('skip', repr(self.skip))} is no number of lines; give a whole number from 0")

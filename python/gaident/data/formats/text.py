@@ -57,7 +57,7 @@ def encoding_of(head: bytes, given: str | None) -> str:
     if given is not None:
         try:
             return codecs.lookup(given).name
-        except LookupError:
+        except (LookupError, ValueError):  # the latter: a NUL in the name
             raise ReadError(
                 f"{arg('encoding', repr(given))} is not known to Python; give for example 'utf-8' or 'latin-1'"
             ) from None
@@ -87,7 +87,7 @@ def _decode(path: str, raw: bytes, encoding: str | None) -> str:
             f"{getattr(error, 'start', 0)}); export the log again, or give its {arg('encoding')}, for example "
             "'latin-1'"
         ) from None
-    except LookupError:
+    except (LookupError, ValueError):
         raise ReadError(
             f"{arg('encoding', repr(encoding))} is not known to Python; give for example 'utf-8' or 'latin-1'"
         ) from None

@@ -12,10 +12,13 @@ from numpy.typing import ArrayLike, NDArray
 from gaident.arguments import arg
 from gaident.errors import RecordError
 
-__all__ = ["MINIMUM_SAMPLES", "channel", "first_not_finite", "positive_number"]
+__all__ = ["MINIMUM_SAMPLES", "channel", "first_not_finite", "positive_number", "sample_time"]
 
 MINIMUM_SAMPLES = 20  # no decision: what an argument may be: a record has so many samples at least
 """Fewer samples identify nothing."""
+
+LARGEST = 1e30  # no decision: what an argument may be: far beyond counters of 64 bits, far below where squares overflow
+SHORTEST, LONGEST = 1e-12, 1e9  # no decision: what an argument may be: sample times [s]
 
 _REFUSED_KINDS = {
     "b": ("boolean", "convert it with .astype(float) if 0 and 1 are really meant"),
@@ -57,9 +60,23 @@ def channel(values: ArrayLike, argument: str) -> NDArray[np.float64]:
             "sample or "
             f"repair the value"
         )
+    if max(float(copy.max()), -float(copy.min())) > LARGEST:
+        far = int(np.argmax(np.abs(copy)))
+        raise RecordError(f"{argument}[{far}] = {copy[far]:g} is beyond {LARGEST:g}, which no drive reaches; correct its unit")
     copy.flags.writeable = False
     view: NDArray[np.float64] = copy.view()
     return view
+
+
+def sample_time(value: object, remedy: str | None = None, argument: str = "dt") -> float:
+    """`value` as a sample time [s]. Raises RecordError for what is none of a drive's, as `positive_number`."""
+    remedy = remedy or f"give the sample time in seconds, for example {arg('dt', '1e-3')}"
+    dt = positive_number(value, argument, "s", remedy)
+    if not SHORTEST <= dt <= LONGEST:
+        raise RecordError(
+            f"{arg(argument, repr(value))} s is no sample time of a drive ({SHORTEST:g} to {LONGEST:g} s); {remedy}"
+        )
+    return dt
 
 
 def _as_array(values: ArrayLike, argument: str) -> NDArray[Any]:

@@ -7,8 +7,7 @@ import math
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from gaident.arguments import arg
-from gaident.data.signals.arrays import channel, positive_number
+from gaident.data.signals.arrays import channel, positive_number, sample_time
 from gaident.errors import RecordError
 
 __all__ = ["differentiate", "low_pass"]
@@ -55,7 +54,7 @@ def differentiate(position: ArrayLike, dt: float, cutoff_hz: float | None = None
     True
     """
     x = channel(position, "position")
-    dt = positive_number(dt, "dt", "s", f"give the sample time in seconds, for example {arg('dt', '1e-3')}")
+    dt = sample_time(dt)
     if cutoff_hz is not None:
         x = low_pass(x, dt, cutoff_hz)
     # The edges stay one-sided: a second-order edge formula would amplify encoder noise there by 2.5.
@@ -83,5 +82,10 @@ def low_pass(x: NDArray[np.float64], dt: float, cutoff_hz: float) -> NDArray[np.
     # Taken off first, it costs no digits when the encoder's offset is large,
     # and a record of constant speed stays exact up to its ends.
     line = x[0] + (x[-1] - x[0]) / (x.size - 1) * np.arange(x.size)
-    smooth = sosfiltfilt(sections, x - line, padlen=min(extension, x.size - 1))
+    try:
+        smooth = sosfiltfilt(sections, x - line, padlen=min(extension, x.size - 1))
+    except np.linalg.LinAlgError:  # its start states: the filter's poles are 1 to the last digit
+        raise RecordError(
+            f"cutoff_hz={cutoff_hz:g} Hz is too low for a filter at dt={dt:g} s; give a higher corner, or None for no filter"
+        ) from None
     return np.asarray(smooth + line, dtype=np.float64)

@@ -21,25 +21,28 @@ def rest(seconds: float, dt: float) -> Vector:
     return np.zeros(max(1, round(seconds / dt)))
 
 
-def levels(speeds: Sequence[float], dwell: float, slope: float, dt: float) -> Vector:
-    """Each of the speeds held for `dwell` [s], reached from the one before at `slope` [rad/s^2] (inf: at once), back to 0."""
+def levels(speeds: Sequence[float], dwell: float, slope: float, dt: float, most: int) -> Vector:
+    """Each of the speeds held for `dwell` [s], reached from the one before at `slope` [rad/s^2] (inf: at once), back to 0.
+
+    Of a ramp only the first `most` samples are made: with it the command is longer than there is time for.
+    """
     parts, now = [], 0.0
     for speed in [*speeds, 0.0]:
-        count = 0 if not np.isfinite(slope) else int(abs(speed - now) / (slope * dt))
-        parts.append(now + (speed - now) * np.arange(1, count + 1) / (count + 1))
+        count = 0.0 if not np.isfinite(slope) else np.floor(abs(speed - now) / max(slope * dt, 1e-300))
+        parts.append(now + (speed - now) * np.arange(1, int(min(count, most)) + 1) / (count + 1.0))
         parts.append(np.full(max(1, round(dwell / dt)), speed))
         now = speed
     return np.concatenate(parts)
 
 
-def strokes(speeds: Sequence[float], dwell: float, travel: float, slope: float, dt: float) -> Vector:
+def strokes(speeds: Sequence[float], dwell: float, travel: float, slope: float, dt: float, most: int) -> Vector:
     """Each speed forwards and backwards for up to `dwell` [s], shortened so that no stroke is longer than `travel` [rad]."""
     parts = []
     for speed in speeds:
         ramp = 0.0 if not np.isfinite(slope) else speed / slope
         # One stroke covers speed (dwell + ramp): half a ramp at each end.
         held = min(dwell, travel / speed - ramp) if speed > 0.0 else dwell
-        parts.append(both_ways(levels([speed], max(held, dt), slope, dt)[: -max(1, round(max(held, dt) / dt))], dt))
+        parts.append(both_ways(levels([speed], max(held, dt), slope, dt, most)[: -max(1, round(max(held, dt) / dt))], dt))
     return np.concatenate(parts)
 
 

@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gaident.axis import Text, checked_axis, joined, say
-from gaident.checks import real_number
+from gaident.checks import above_zero
 from gaident.control.filtering import rate_limited
 from gaident.control.pi import PI
 from gaident.data.record import Record
@@ -39,6 +39,7 @@ __all__ = ["Limits", "MenuItem", "Proposal", "candidate_commands", "first_experi
 
 Vector = NDArray[np.float64]
 
+LONGEST_COMMAND = 20_000_000  # no decision: what an argument may be: samples
 AT_ONCE = 2  # no decision: the samples that a jump takes by the shape of the commands: a reversal has a sample of rest between
 
 
@@ -186,18 +187,22 @@ def limits_of(records: Record | Sequence[Record], controller: PI | None = None, 
 def _bench(dt: float, limits: Limits, inertia: float | None, kp: float | None) -> Bench:
     if not isinstance(limits, Limits):
         raise SettingsError(f"limits is {limits!r}: give gaident.Limits(speed, torque, travel, duration)")
-    for name, value in (("dt", dt), ("inertia", inertia), ("kp", kp)):
-        if value is not None and not real_number(value, name, SettingsError, "give one number > 0") > 0.0:
-            raise SettingsError(f"{name} is {value!r}: give one number > 0")
+    dt = above_zero(dt, "dt", SettingsError, "give one number > 0")
+    inertia, kp = (
+        None if value is None else above_zero(value, name, SettingsError, "give one number > 0")
+        for name, value in (("inertia", inertia), ("kp", kp))
+    )
     least = POLICY.least_command * dt
     if limits.duration < least:
         raise SettingsError(f"duration is {limits.duration:g} s, {int(limits.duration / dt)} samples: give {least:g} s or more")
+    if limits.duration / dt > LONGEST_COMMAND:
+        raise SettingsError(f"duration is {limits.duration:g} s, more than {LONGEST_COMMAND} samples of {dt:g} s: give less")
     stroke = POLICY.used_share * limits.travel
     speed = min(POLICY.used_share * limits.speed, stroke / (POLICY.stroke_samples * dt))
     top, slope = _ramps(limits, inertia, kp)
     # Half a stroke to rise, half to fall: v^2 = slope * stroke.
     speed = min(speed, POLICY.ramped_stroke * math.sqrt(slope * stroke)) if math.isfinite(stroke) else speed
-    return Bench(dt, speed, min(speed, top), stroke, slope, limits.duration, limits.torque, kp)
+    return Bench(dt, speed, min(speed, top), stroke, slope, limits.duration, limits.torque, kp, int(limits.duration / dt + 1e-9))
 
 
 def _ramps(limits: Limits, inertia: float | None, kp: float | None) -> tuple[float, float]:
@@ -214,6 +219,7 @@ def _ramps(limits: Limits, inertia: float | None, kp: float | None) -> tuple[flo
 def _filled(build: Builder, bench: Bench) -> Vector:
     """The pattern, quickened (then slowed down) until it fits the bench's time, as often as it then fits."""
     room = int(bench.seconds / bench.dt + 1e-9)
+    bench = replace(bench, room=room)
     pattern = build(bench)
     for attempt in range(POLICY.quickened):
         if len(pattern) <= room:

@@ -29,6 +29,7 @@ class Bench:
     """Limits in the terms of the builders: speed, stroke and slope that may be used, seconds for one item.
 
     top: the speed that ramps may go to, with room for the overshoot where they end.
+    room: samples of an item at most.
     """
 
     dt: float
@@ -39,6 +40,7 @@ class Bench:
     seconds: float
     torque: float
     kp: float | None
+    room: int
 
     @property
     def jump(self) -> float:
@@ -55,7 +57,7 @@ def speed_ladder(b: Bench) -> Vector:
     dwell = b.seconds / (2.6 * len(shares))
     parts = []
     for i, share in enumerate(shares):
-        stroke = strokes([share * b.top], dwell, b.travel, b.slope, b.dt)
+        stroke = strokes([share * b.top], dwell, b.travel, b.slope, b.dt, b.room)
         parts.append(_dither(stroke, b) if i % 2 else stroke)
     return np.concatenate(parts)
 
@@ -71,7 +73,7 @@ def slow_stairs(b: Bench) -> Vector:
     dwell = b.seconds / (3.0 * len(shares))
     parts: list[Vector] = []
     for share in shares:
-        parts += [strokes([min(share * b.speed, 0.5 * b.jump)], dwell, b.travel, math.inf, b.dt), rest(0.5 * dwell, b.dt)]
+        parts += [strokes([min(share * b.speed, 0.5 * b.jump)], dwell, b.travel, math.inf, b.dt, b.room), rest(0.5 * dwell, b.dt)]
     return np.concatenate(parts)
 
 
@@ -86,13 +88,13 @@ def reversals(b: Bench) -> Vector:
         dwell = max(b.seconds / 16.0, 10 * b.dt)
         small = share < 0.1
         speed = min(share * b.speed, 0.5 * b.jump) if small else share * b.speed
-        parts += [strokes([speed], dwell, b.travel, math.inf if small else b.slope, b.dt)] * 3
+        parts += [strokes([speed], dwell, b.travel, math.inf if small else b.slope, b.dt, b.room)] * 3
     return np.concatenate(parts)
 
 
 def prbs_moving(b: Bench) -> Vector:
     """A binary signal on half the speed, three amplitudes, forwards and backwards."""
-    stroke = strokes([0.5 * b.speed], b.seconds / 7.0, b.travel, b.slope, b.dt)
+    stroke = strokes([0.5 * b.speed], b.seconds / 7.0, b.travel, b.slope, b.dt, b.room)
     largest = 0.1 * b.speed if b.kp is None else min(0.2 * b.speed, 0.25 * b.jump)
     parts = [dithered(stroke, f * largest, c) for f, c in ((0.3, 1), (0.6, 2), (1.0, 4))]
     return np.concatenate(parts)
@@ -109,7 +111,9 @@ def steps(b: Bench) -> Vector:
     """Steps of 10, 30 and 100 %: forwards, from there backwards, which is a jump of twice the speed, and back to rest."""
     # A jump overshoots more than a ramp: with kp there is room for a third of 2 v.
     full = 0.8 * b.speed if b.kp is None else min(0.65 * b.speed, 0.5 * b.jump)
-    return np.concatenate([strokes([share * full], b.seconds / 6.5, b.travel, math.inf, b.dt) for share in (0.1, 0.3, 1.0)])
+    return np.concatenate(
+        [strokes([share * full], b.seconds / 6.5, b.travel, math.inf, b.dt, b.room) for share in (0.1, 0.3, 1.0)]
+    )
 
 
 def _constant_slow(b: Bench) -> Vector:
@@ -117,7 +121,7 @@ def _constant_slow(b: Bench) -> Vector:
     dwell = b.seconds / 6.5
     wanted = 5.0 * math.tau / dwell
     shares = [min(f * b.speed, g * wanted) for f, g in ((0.1, 0.4), (0.3, 1.0), (0.6, 2.5))]
-    return strokes(shares, dwell, b.travel, b.slope, b.dt)
+    return strokes(shares, dwell, b.travel, b.slope, b.dt, b.room)
 
 
 def _holds(b: Bench) -> Vector:
@@ -138,8 +142,8 @@ def _holds(b: Bench) -> Vector:
 
 def _repeat(b: Bench) -> Vector:
     """The same levels at start and end, a fast warm-up between."""
-    segment = strokes([0.2 * b.top, 0.6 * b.top], b.seconds / 17.0, b.travel, b.slope, b.dt)
-    warm = strokes([b.top] * 3, b.seconds / 13.0, b.travel, b.slope, b.dt)
+    segment = strokes([0.2 * b.top, 0.6 * b.top], b.seconds / 17.0, b.travel, b.slope, b.dt, b.room)
+    warm = strokes([b.top] * 3, b.seconds / 13.0, b.travel, b.slope, b.dt, b.room)
     return np.concatenate([segment, warm, segment])
 
 

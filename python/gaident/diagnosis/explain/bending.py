@@ -88,7 +88,7 @@ def relevance_of(after: Fitness, floor: float, bent: tuple[str, ...]) -> Relevan
 
 def _beyond(error: float, noise: float) -> float:
     """sqrt(error^2 - noise^2), 0 where the error is below the noise."""
-    return math.sqrt(max(error**2 - noise**2, 0.0))
+    return math.sqrt(max(error * error - noise * noise, 0.0))
 
 
 def _orthonormal(rows: Matrix) -> Matrix:

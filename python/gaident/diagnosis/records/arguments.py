@@ -8,6 +8,7 @@ import numpy as np
 
 from gaident.arguments import NO_CONTROLLER
 from gaident.axis import period_of
+from gaident.checks import above_zero
 from gaident.control.pi import PI
 from gaident.data.record import Record
 from gaident.errors import RecordError, SettingsError
@@ -75,8 +76,7 @@ def accuracy_of(accuracy: float | Mapping[str, float] | None) -> dict[str, float
     for name, value in given.items():
         if name not in ("velocity", "torque"):
             raise SettingsError(f"accuracy has {name!r}: give a velocity in rad/s, or 'velocity' and 'torque' [N m] with numbers")
-        if isinstance(value, bool) or not isinstance(value, (int, float)) or not 0.0 < float(value) < float("inf"):
-            raise SettingsError(f"accuracy of the {name} is {value!r}: give a number above 0, in rad/s or N m")
+        above_zero(value, f"accuracy of the {name}", SettingsError, "give a number above 0, in rad/s or N m")
     return {name: float(value) for name, value in given.items()}
 
 
@@ -91,7 +91,7 @@ def expected_of(expected: Mapping[str, tuple[float, float]] | None) -> dict[str,
             raise SettingsError(f"expected has {name!r}: {remedy}")
         try:
             low, high = (float(v) for v in value)
-        except (TypeError, ValueError):
+        except (TypeError, ValueError, OverflowError):
             raise SettingsError(f"expected {name} is {value!r}: {remedy}") from None
         if not 0.0 <= low < high:
             raise SettingsError(f"expected {name} is {value!r}: {remedy}, with 0 <= lowest < highest")
@@ -112,6 +112,4 @@ def noise_std_of(noise: float | Record | None) -> float | None:
         if not float(np.std(noise.velocity)) > 0.0:
             raise SettingsError("noise is a record whose velocity never changes: give its standard deviation in rad/s, or None")
         return float(np.std(noise.velocity))
-    if isinstance(noise, bool) or not isinstance(noise, (int, float)) or not 0.0 < float(noise) < float("inf"):
-        raise SettingsError(f"noise is {noise!r}: give its standard deviation in rad/s, above 0, or a Record at standstill")
-    return float(noise)
+    return above_zero(noise, "noise", SettingsError, "give its standard deviation in rad/s, above 0, or a Record at standstill")

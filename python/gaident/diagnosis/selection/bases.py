@@ -151,7 +151,7 @@ def noise_floor(task: Task, one: Fit) -> float:
     objective, data = task.objective, task.data
 
     def beyond(power: float) -> float:
-        return max(POLICY.immaterial**2 * power - data.noise**2, 0.0)
+        return max(POLICY.immaterial**2 * power - data.noise * data.noise, 0.0)
 
     used = objective.weight > 0.0
     floor = beyond(float(np.mean(objective.error(one)[used] ** 2)))

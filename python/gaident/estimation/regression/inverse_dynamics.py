@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gaident.axis import TURN, Text, checked_axis, percent, say, turns
+from gaident.checks import real_number
 from gaident.data.record import Record
 from gaident.errors import RecordError, SettingsError
 from gaident.estimation.criterion import bic, effective_samples
@@ -171,7 +172,7 @@ def inverse_dynamics(
 
 
 def _checked(rec: Record | Sequence[Record], argument: str) -> list[Record]:
-    records = [rec] if isinstance(rec, Record) else list(rec)
+    records = [rec] if isinstance(rec, Record) else list(rec) if isinstance(rec, Iterable) else []
     if not records or not all(isinstance(r, Record) for r in records):
         raise RecordError(f"{argument} is {rec!r}: give a Record or a list of Records")
     for i, r in enumerate(records):
@@ -190,12 +191,12 @@ def _checked(rec: Record | Sequence[Record], argument: str) -> list[Record]:
 def _number(value: object, argument: str, what: str) -> float:
     if isinstance(value, bool) or not isinstance(value, int | float | np.integer | np.floating):
         raise SettingsError(f"{argument}={value!r} is no number; give {what}, or None")
-    return float(value)
+    return real_number(value, argument, SettingsError, f"give {what}, or None")
 
 
 def _known_terms(terms: Sequence[str]) -> tuple[str, ...]:
-    names = (terms,) if isinstance(terms, str) else tuple(terms)
-    unknown = [name for name in names if name not in TERMS]
+    names = (terms,) if isinstance(terms, str) else tuple(terms) if isinstance(terms, Iterable) else ()
+    unknown = [name for name in names if not isinstance(name, str) or name not in TERMS]
     if unknown or not names:
         raise SettingsError(f"terms={terms!r}: give names of {', '.join(TERMS)}")
     for one, other in (

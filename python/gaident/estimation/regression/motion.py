@@ -59,7 +59,7 @@ def motion_of(rec: Record, cutoff_hz: float, order: int, standstill: float | Non
     noise, rms = _velocity_noise(rec, spectrum, cutoff_hz, order), float(np.sqrt(np.mean(velocity**2)))
     least = max(POLICY.standing_noise * noise, POLICY.standing_share * rms)
     threshold = least if standstill is None else standstill
-    still = _beside(np.abs(velocity) <= threshold, max(1, round(1.0 / (cutoff_hz * rec.dt))))
+    still = _beside(np.abs(velocity) <= threshold, max(1, round(min(1.0 / (cutoff_hz * rec.dt), float(len(velocity))))))
     if standstill == 0.0:
         still = np.zeros(len(velocity), dtype=bool)
     return Motion(rec.dt, position, velocity, np.gradient(velocity, rec.dt), torque, threshold, still, spectrum)
@@ -127,7 +127,8 @@ def _twice(rec: Record, f: Vector, cutoff_hz: float, order: int) -> Vector:
     """Gain of the filter, run forward and backward, at frequencies f [Hz]."""
     # no decision: a formula: next to the Nyquist frequency
     warped = np.tan(np.pi * np.minimum(f, 0.499 / rec.dt) * rec.dt) / math.tan(math.pi * cutoff_hz * rec.dt)
-    return np.asarray(1.0 / (1.0 + warped ** (2 * order)))
+    with np.errstate(over="ignore"):  # far above the corner nothing passes
+        return np.asarray(1.0 / (1.0 + warped ** (2 * order)))
 
 
 def _gain(rec: Record, f: Vector, cutoff_hz: float, order: int, derivative: int) -> Vector:

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from gaident.checks import real_number
 from gaident.data.record import Record
 from gaident.data.signals.arrays import channel
 from gaident.data.signals.decimation import decimated
@@ -23,6 +24,7 @@ __all__ = ["WindingFit", "estimate_winding"]
 
 Vector = NDArray[np.float64]
 
+PASSES = 3  # no decision: of a solver
 NAMES = {"resistance": "Ohm", "back_emf_constant": "V s/rad", "inductance": "H", "offset": "V"}
 
 
@@ -62,10 +64,19 @@ def estimate_winding(
 ) -> WindingFit:
     """Estimate a winding's resistance and back-EMF constant from voltage, current and velocity.
 
-        U_h(n) = R i(n) + ke w(n) + L (i(n+1) - i(n-1))/(2 dt) + U0,   U_h(n) = (U(n) + U(n-1))/2
+        U(n) = R (i(n) + i(n+1))/2 + ke ((1 - h) w(n) + h w(n+1)) + c (i(n+1) - i(n)) + U0
 
     by least squares, all signals behind the same zero-phase filter and decimated.
-    U_h is what a voltage that is held over each sample shows in a central difference.
+    Under a voltage that is held over each sample the current goes with the time constant L/R to where it would settle, so that
+
+        i(n+1) = a i(n) + (1 - a) (U(n) - U0 - ke w)/R,   a = exp(-R dt/L)
+        c = R/2 (1 + a)/(1 - a),   L = R dt/ln((2c + R)/(2c - R)),   h = 1/(1 - a) - L/(R dt)
+
+    h weighs a velocity that goes straight from sample to sample; it is 1/2 in a first pass, and that of the L found in two more.
+    With 2c <= R the current follows within the sample, and no inductance is determined; then h = 1/2 + c/R, which is 1 where the
+    current is sampled at the end of the sample's voltage, and 0 where it is at its begin.
+    The winding has the inductance where 2c is above R by `winding_sure` deviations of the difference: of that L is a logarithm,
+    so that an L of an eighth of a sample or less cannot be told from none, whatever the deviation of L.
     The deviations know that neighbouring errors are alike (Newey and West 1987).
 
     Parameters
@@ -106,23 +117,37 @@ def estimate_winding(
     if not len(U) == len(i) == len(w):
         raise RecordError(f"voltage, current and velocity have {len(U)}, {len(i)} and {len(w)} samples: give the same of each")
     rec = Record(dt, velocity=w, torque=i)
-    cutoff = cutoff_of(rec, ORDER) if cutoff_hz is None else float(cutoff_hz)
+    with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
+        return _estimated(U, i, w, rec, cutoff_hz)
+
+
+def _estimated(U: Vector, i: Vector, w: Vector, rec: Record, cutoff_hz: float | None) -> WindingFit:
+    remedy = f"give a corner between 0 and {0.5 / rec.dt:g} Hz, or None"  # no decision: a formula: the Nyquist frequency
+    cutoff = cutoff_of(rec, ORDER) if cutoff_hz is None else real_number(cutoff_hz, "cutoff_hz", RecordError, remedy)
     if not 0.0 < cutoff < 0.5 / rec.dt:  # no decision: a formula: the Nyquist frequency
         raise RecordError(f"cutoff_hz={cutoff_hz!r}: give a corner between 0 and {0.5 / rec.dt:g} Hz, or None")
     factor = decimation_of(None, cutoff, rec.dt)
-    held = 0.5 * (U + np.concatenate([U[:1], U[:-1]]))
-    U, i, w = (low_passed(x, rec.dt, cutoff, ORDER) for x in (held, i, w))
-    columns = (i, w, np.gradient(i, rec.dt), np.ones(len(i)))
-    X, y = (np.column_stack([decimated(np.ascontiguousarray(c), factor) for c in part])[2:-2] for part in (columns, (U,)))
-    if len(X) < POLICY.least_rows:
-        raise RecordError(f"only {len(X)} rows are left of {len(w)} samples behind {cutoff:g} Hz; give a longer record")
-    theta, _ = solve(X, y[:, 0])
-    left = y[:, 0] - X @ theta
-    std = np.sqrt(np.diag(covariance([X], [left])))
+    U, i, w = (low_passed(x, rec.dt, cutoff, ORDER) for x in (U, i, w))
+    U, later = U[:-1], 0.5
+    for _ in range(PASSES):
+        columns = (0.5 * (i[1:] + i[:-1]), (1.0 - later) * w[:-1] + later * w[1:], np.diff(i), np.ones(len(U)))
+        X, y = (np.column_stack([decimated(np.ascontiguousarray(c), factor) for c in part])[2:-2] for part in (columns, (U,)))
+        if len(X) < POLICY.least_rows:
+            raise RecordError(f"only {len(X)} rows are left of {len(w)} samples behind {cutoff:g} Hz; give a longer record")
+        theta, _ = solve(X, y[:, 0])
+        left = y[:, 0] - X @ theta
+        later = _later(float(theta[0]), float(theta[2]))
+    R, c = float(theta[0]), float(theta[2])
+    cov = covariance([X], [left])
+    std = np.sqrt(np.diag(cov))
+    excess, unsure = 2.0 * c - R, float(np.sqrt(4.0 * cov[2, 2] - 4.0 * cov[0, 2] + cov[0, 0]))
+    theta[2] = _inductance(R, excess, rec.dt)
+    std[2] = 0.5 * (_inductance(R, excess + unsure, rec.dt) - _inductance(R, excess - unsure, rec.dt))
     found = {
         name: Estimate(float(x), float(s), unit, identifiable=bool(s < abs(x)))
         for (name, unit), x, s in zip(NAMES.items(), theta, std, strict=True)
     }
+    found["inductance"] = replace(found["inductance"], identifiable=excess > unsure)
     for name in ("resistance", "back_emf_constant"):
         e = found[name]
         if not e.value > POLICY.winding_sure * e.std:
@@ -131,10 +156,21 @@ def estimate_winding(
                 "do not determine it; check their units and signs, and give a motion with load and speed apart, such as "
                 "reversals and ramps"
             )
-    inductance = found["inductance"]
-    winding = Winding(
-        found["resistance"].value,
-        found["back_emf_constant"].value,
-        inductance.value if inductance.value > POLICY.winding_sure * inductance.std else 0.0,
-    )
+    shown = excess > POLICY.winding_sure * unsure  # not L by its own deviation: near 0 it is a logarithm of the excess
+    winding = Winding(found["resistance"].value, found["back_emf_constant"].value, found["inductance"].value if shown else 0.0)
     return WindingFit(winding, found, float(np.sqrt(left @ left / (y[:, 0] @ y[:, 0]))), cutoff)
+
+
+def _inductance(R: float, excess: float, dt: float) -> float:
+    """L = R dt/ln((2c + R)/(2c - R)) of the excess 2c - R; 0 without one."""
+    if not (R > 0.0 and excess > 0.0):  # no decision: a formula: the logarithm has no value there
+        return 0.0
+    return float(R * dt / np.log1p(2.0 * R / excess))
+
+
+def _later(R: float, c: float) -> float:
+    """h, the weight of the velocity at the sample's end; of a current that follows within the sample, that of its instant."""
+    slow = R / _inductance(R, 2.0 * c - R, 1.0) if 2.0 * c > R > 0.0 else 0.0  # no decision: a formula; R dt/L
+    if slow > 0.0:
+        return float(1.0 / -np.expm1(-slow) - 1.0 / slow)
+    return float(np.clip(0.5 + c / R, 0.0, 1.0)) if R > 0.0 else 0.5  # no decision: a formula, and the start of the passes
