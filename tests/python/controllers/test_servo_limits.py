@@ -128,8 +128,9 @@ def test_a_limit_that_a_slow_log_shows_is_said_and_the_gains_are_as_sure_as_they
     done = ga.run(ga.OneMass(J=4e-4, D=2e-3), ga.Record(dt, command=command, velocity=still), true)
     rec = ga.Record(dt, command=command, velocity=done.velocity + noise * rng.standard_normal(len(command)), torque=done.torque)
     found = loop_of([rec], ga.Cascade(ga.PI(0.05, 1.5) if known else ga.PI(kp=None, ki=None), period=dt / 4))
-    (limit,) = found.findings
-    assert limit.effect == "torque_saturation" and limit.parameters["limit"].value == pytest.approx(0.6)
+    limit, windup = found.findings
+    assert (limit.effect, windup.effect, dict(windup.parameters)) == ("torque_saturation", "anti_windup", {})
+    assert limit.parameters["limit"].value == pytest.approx(0.6)
     assert isinstance(found.controller, ga.Cascade) and found.controller.velocity.anti_windup == "hold"
     if not known:
         for name, value in (("velocity.kp", 0.05), ("velocity.ki", 1.5)):

@@ -187,11 +187,11 @@ def test_an_anti_windup_that_was_not_given_is_found_at_a_given_limit(windup: str
     assert (found.limit, found.controller, found.gain > 0.0) == (None, true, windup != "none")
     for controller in (ga.Cascade(given, T), given):
         loop = loop_of([rec], controller)
-        assert loop.controller == true and loop.findings == ()
-        assert any("anti-windup 'hold'" in str(note) for note in loop.notes) == (windup == "hold")
+        assert loop.controller == true and [f.effect for f in loop.findings] == ["anti_windup"] * (windup == "hold")
+        assert all("anti-windup 'hold'" in str(f.evidence) and f.delta_bic > 100.0 for f in loop.findings)
 
 
-@pytest.mark.parametrize(("windup", "said"), [("none", "without its anti-windup"), ("hold", "the integrator is held")])
+@pytest.mark.parametrize(("windup", "said"), [("none", "without its anti-windup"), ("hold", "an integrator that is held")])
 @pytest.mark.parametrize("timed", [True, False])
 def test_another_anti_windup_than_the_given_one_is_found_at_a_given_limit(windup: str, said: str, timed: bool) -> None:
     wrong = ga.PI(KP, KI, torque_limit=0.6, anti_windup="tracking", tracking_time=5e-3)
@@ -199,7 +199,9 @@ def test_another_anti_windup_than_the_given_one_is_found_at_a_given_limit(windup
     rec = slower(noise=0.005, torque_limit=0.6, windup=windup)
     assert limited([rec], ga.Cascade(wrong, T)).controller == true
     dia = ga.diagnose(rec, controller=ga.Cascade(wrong, T) if timed else wrong)
-    assert (dia.verdict, dia.findings, dia.controller) == ("adequate", (), true)
+    named = ["anti_windup"] * (windup == "hold")
+    assert ([f.effect for f in dia.findings], dia.controller) == (named, true)
+    assert dia.verdict == ("explained" if named else "adequate"), "what a controller has too much is a note"
     notes = " ".join(map(str, dia.notes))
     assert said in notes and "torque saturation" not in notes
 
@@ -233,7 +235,9 @@ def test_a_form_is_found_although_an_unknown_limit_acts(form: str) -> None:
     made = {"command filter": {"command_filters": [low(2e-3)]}, "torque filter": {"torque_filters": [low(5e-4)]}, "none": {}}
     named = {"command filter": {"command_filter"}, "torque filter": {"torque_filter"}, "none": set()}
     shown = shown_by(log(torque_limit=0.6, windup="tracking", tracking=4e-3, **made[form]))
-    assert shown is not None and set(shown.numbers) == {*named[form], "torque_saturation"}
+    assert shown is not None and set(shown.numbers) == {*named[form], "torque_saturation", "anti_windup"}
+    time, std = shown.numbers["anti_windup"]["tracking_time"]
+    assert abs(time - 4e-3) < max(4.0 * std, 1e-5) < 1e-3
     assert shown.numbers["torque_saturation"]["limit"][0] == pytest.approx(0.6, rel=1e-6)
 
 
@@ -308,13 +312,14 @@ def test_what_a_slow_log_does_not_show_between_its_lines_counts_behind_a_filter(
 
 
 def test_a_form_that_was_found_is_not_looked_for_again() -> None:
-    """The scheme that comes closest at the limit is in doubt, the limit is not."""
     rec = slower(4, torque_limit=0.6, windup="tracking", tracking=4e-3, weight=0.5)
     with threadpool_limits(1, user_api="blas"):
         asked = loop_of([rec], ga.Cascade(GIVEN, T))
         driven = torque_driven([rec], asked.controller)
         found = driving_of(driven.records, (), asked, driven, {driven.records[0].digest: rec})
-    assert {f.effect for f in asked.findings} == {"torque_saturation", "command_weight"}
+    assert {f.effect for f in asked.findings} == {"torque_saturation", "anti_windup", "command_weight"}
+    (windup,) = (f.parameters["tracking_time"] for f in asked.findings if f.effect == "anti_windup")
+    assert abs(windup.value - 4e-3) < 4.0 * windup.std < 2e-3
     assert found.findings == asked.findings and found.controller == asked.controller
 
 

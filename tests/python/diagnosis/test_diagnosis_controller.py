@@ -227,11 +227,12 @@ def test_a_limit_that_the_log_shows_is_a_finding_and_part_of_the_model() -> None
 
 def test_an_anti_windup_is_said_and_its_free_run_not_trusted() -> None:
     found = ga.diagnose(limited_drive(0.5, "held"), CONTROLLER)
-    assert [f.effect for f in found.findings] == ["torque_saturation"]
-    assert "the integrator held while the torque is limited" in found.findings[0].evidence
+    assert [(f.effect, f.place) for f in found.findings] == [("torque_saturation", "controller"), ("anti_windup", "controller")]
+    assert found.findings[1].delta_bic > 100.0 and "the integrator held while the torque is limited" in found.findings[0].evidence
     assert any("does not hold its integrator" in note for note in found.notes)
     configured = ga.diagnose(limited_drive(0.5, "held"), ga.PI(CONTROLLER.kp, CONTROLLER.ki, torque_limit=0.5))
-    assert configured.findings == () and any("(anti-windup)" in note for note in configured.notes)
+    assert [f.effect for f in configured.findings] == ["anti_windup"] and configured.verdict == "explained"
+    assert "(anti-windup)" in configured.findings[0].evidence
 
 
 def test_a_hum_gets_its_frequency_and_size_and_a_lattice_its_noise() -> None:

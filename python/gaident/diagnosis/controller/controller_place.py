@@ -17,7 +17,7 @@ from gaident.control.controller import Controller
 from gaident.control.pi import PI
 from gaident.control.pi_torque import HOLDS, held_torque, pi_torque
 from gaident.data.record import Record
-from gaident.diagnosis.library.settings import OF_SETTING
+from gaident.diagnosis.library.settings import ANTI_WINDUP, OF_SETTING
 from gaident.diagnosis.library.terms import in_controller
 from gaident.estimation.criterion import gained
 from gaident.estimation.dataset import DataSet, torque_in
@@ -227,7 +227,9 @@ def _limit_findings(
         std = max(*(r.resolution for r in off), float(np.sqrt(after / n)))
         findings.append(_finding(effect, "limit", Estimate(value, std, "N m"), before, after, floor, n, text))
     if anti_windup:
-        notes = [] if findings else notes
+        notes = []
+        gain = gained(_left_with(data, shown, holds=False), max(after, floor), n, 1)
+        findings.append(Finding(ANTI_WINDUP, {}, (), 0.0, gain, None, off[0].sentence, place="controller"))
         notes.append(
             Text(
                 "The simulated controller does not hold its integrator at the limit: its free run winds up where the drive's "
@@ -238,13 +240,13 @@ def _limit_findings(
     return findings, AtController(decided, effects, shown, follows=not anti_windup), notes
 
 
-def _left_with(data: DataSet, controller: PI) -> float:
-    """Squared error of the logged torques that a limited controller leaves, with or without an anti-windup [(N m)^2]."""
+def _left_with(data: DataSet, controller: PI, holds: bool = True) -> float:
+    """Squared error of the logged torques that a limited controller leaves [(N m)^2]; holds: also with an anti-windup."""
     total = 0.0
     for r in data.read:
         assert r.command is not None and r.torque is not None
         made = [pi_torque(r.command, r.velocity, r.dt, controller)]
-        made += [held_torque(r.command, r.velocity, r.dt, controller, rule) for rule in HOLDS]
+        made += [held_torque(r.command, r.velocity, r.dt, controller, rule) for rule in HOLDS if holds]
         total += min(float(np.sum((r.torque - u) ** 2)) for u in made)
     return total
 

@@ -18,7 +18,7 @@ from gaident.diagnosis.controller.forms import Shown, form_shown
 from gaident.diagnosis.controller.limit_not_given import left_by_a_limit
 from gaident.diagnosis.controller.period_shown import FASTER, Period, period_shown
 from gaident.diagnosis.controller.slow_forms import run_error
-from gaident.diagnosis.library.settings import OF_SETTING
+from gaident.diagnosis.library.settings import ANTI_WINDUP, OF_SETTING
 from gaident.identification.controller_numbers import Numbers, with_estimates
 from gaident.identification.replay.command_timing import timed
 from gaident.identification.replay.replay import replay
@@ -38,6 +38,7 @@ UNITS = {
     "time_constant": "s",
     "frequency": "Hz",
     "limit": "N m",
+    "tracking_time": "s",
 }
 """Of the findings' parameters; the others are numbers."""
 RULES = {
@@ -204,16 +205,27 @@ def _estimates(numbers: Mapping[str, tuple[float, float]]) -> dict[str, Estimate
 
 def parts_of(shown: Shown) -> Text:
     """What differs from the bare PI."""
-    return joined(", ", (_part(shown, name) for name in shown.numbers)) if shown.numbers else Text("an anti-windup at its limit")
+    return joined(", ", (_part(shown, name) for name in shown.numbers))
 
 
 def _part(shown: Shown, name: str) -> Text:
     if name == "integration_rule":
         return Text(RULES[shown.controller.velocity.rule])
+    if name == ANTI_WINDUP:
+        return Text(_windup(shown.controller.velocity))
     numbers = ((key.replace("_", " "), value, _unit(key)) for key, (value, _) in shown.numbers[name].items())
     values = joined(", ", (say("{} {:.4g}{}", *number) for number in numbers))
     article = {"other_gains": "", "acceleration_feedforward": "an "}.get(name, "a ")
     return say("{}{} ({})", article, name.replace("_", " "), values)
+
+
+def _windup(pi: PI) -> str:
+    """What the integrator of a controller does at its torque limit."""
+    if pi.anti_windup == "none":
+        return "an integrator that winds up at the torque limit"
+    does = {"hold": "held", "tracking": "set back"}[pi.anti_windup]
+    how = repr(pi.anti_windup) if pi.tracking_time is None else f"{pi.anti_windup!r}, {1e3 * pi.tracking_time:.4g} ms"
+    return f"an integrator that is {does} at the torque limit (anti-windup {how})"
 
 
 def _unit(parameter: str) -> Text:
@@ -231,12 +243,9 @@ def notes_of(shown: Shown, records: Sequence[Record]) -> tuple[Text, ...]:
             say(": its {torque} drives the model") if shown.controller.period is None else "",
         )
     ]
-    scheme = shown.controller.velocity.anti_windup
-    if (OF_SETTING["torque_limit"] in shown.numbers or not shown.numbers) and scheme != "none":
-        does = {"hold": "is held", "tracking": "is set back"}[scheme]
-        time = shown.controller.velocity.tracking_time
-        how = repr(scheme) if time is None else f"{scheme!r}, {1e3 * time:.4g} ms"
-        notes.append(Text(f"At its limit the integrator {does} (anti-windup {how}): so the controller comes closest."))
+    pi = shown.controller.velocity
+    if OF_SETTING["torque_limit"] in shown.numbers and ANTI_WINDUP not in shown.numbers and pi.anti_windup != "none":
+        notes.append(Text(f"With {_windup(pi)} the controller comes closest; the log hardly tells it from others."))
     if shown.rivals:
         others = "; ".join(" and ".join(name.replace("_", " ") for name in names) for names in shown.rivals)
         notes.append(Text(f"The log does not tell this from a controller with, instead: {others}."))

@@ -35,7 +35,7 @@ from gaident.diagnosis.controller.form_comparison import (
 )
 from gaident.diagnosis.controller.form_regression import Law, law_of, quiet_law
 from gaident.diagnosis.controller.slow_forms import limited, run_error, too_fast
-from gaident.diagnosis.library.settings import OF_SETTING
+from gaident.diagnosis.library.settings import ANTI_WINDUP, OF_SETTING
 from gaident.identification.replay.causes import white_noise
 from gaident.identification.replay.command_timing import timed
 from gaident.identification.replay.replay import tolerance_of, velocity_steps
@@ -271,6 +271,10 @@ def _with_limit(
     if at_limit.limit is not None:
         differs[OF_SETTING["torque_limit"]] = {"limit": (at_limit.limit, at_limit.std)}
         gains[OF_SETTING["torque_limit"]] = at_limit.gain
+    if at_limit.windup > 0.0:
+        time = at_limit.controller.velocity.tracking_time
+        differs[ANTI_WINDUP] = {} if time is None else {"tracking_time": (time, at_limit.time_std)}
+        gains[ANTI_WINDUP] = at_limit.windup
     return Shown(
         controller=at_limit.controller,
         numbers=differs,

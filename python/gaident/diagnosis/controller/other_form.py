@@ -18,7 +18,7 @@ from gaident.data.record import Record
 from gaident.diagnosis.controller.form import FILTER_NAMES
 from gaident.diagnosis.controller.form_findings import Driver, findings_of, notes_of, parts_of
 from gaident.diagnosis.controller.forms import form_shown
-from gaident.diagnosis.library.settings import OF_SETTING
+from gaident.diagnosis.library.settings import ANTI_WINDUP, OF_SETTING
 from gaident.identification.logged_torque import not_followed
 from gaident.models.drive_torque import driven_by
 from gaident.policy.table import POLICY
@@ -52,8 +52,7 @@ def other_form(records: Sequence[Record], validation: Sequence[Record], given: C
     )
     absent = _left_out(found, cascade)
     without = say(" without its {}", joined(", ", [Text(name) for name in absent])) if absent else ""
-    added = shown is not None and (shown.numbers or found.velocity.anti_windup not in ("none", cascade.velocity.anti_windup))
-    beside = say("{} with {}", " and" if absent else "", parts_of(shown)) if shown is not None and added else ""
+    beside = say("{} with {}", " and" if absent else "", parts_of(shown)) if shown is not None and shown.numbers else ""
     notes = (say(words, without, beside), *(() if shown is None else notes_of(shown, records)[1:]))
     driven, later = (tuple(driven_by(r, found) for r in part) for part in (records, validation))
     numbers = None if shown is None else shown.found.then(lambda one: replace(cascade_of(one), delay=cascade.delay))
@@ -67,6 +66,8 @@ def _differs(name: str, found: Cascade, given: Cascade) -> bool:
         return here.rule != there.rule
     if name == "command_weight":
         return not _same(here.command_weight, there.command_weight)
+    if name == ANTI_WINDUP:
+        return here.anti_windup != there.anti_windup or not _same(here.tracking_time or 0.0, there.tracking_time or 0.0)
     if name == OF_SETTING["torque_limit"]:
         return not _same(here.limits[0], there.limits[0])
     place = next((place for place, finding in FILTER_NAMES.items() if finding == name), "")

@@ -38,13 +38,16 @@ class Limited:
     """The controller with the limit that the logs show, if any; limit [N m] None: none, or the given one.
 
     gain: BIC units by which the whole run is better than without the limit, or the anti-windup at a given one; 0: neither.
-    std: of the limit [N m], of what stands at it.
+    std: of the limit [N m], of what stands at it. windup: BIC units by which it is better than with the given anti-windup at the
+    limit; 0: it does not take the share away that a number has to, or is the given one. time_std: of its tracking time [s].
     """
 
     controller: Cascade
     limit: float | None
     gain: float
     std: float = 0.0
+    windup: float = 0.0
+    time_std: float = 0.0
 
 
 def run_error(records: Sequence[Record], controller: Cascade) -> float:
@@ -85,8 +88,9 @@ def limited(records: Sequence[Record], controller: Cascade) -> Limited:
         return Limited(controller, None, 0.0)
     if given is not None:
         best = _closest(records, controller, given)
-        closer = run_error(records, best) < POLICY.each_number * run_error(records, controller)
-        return Limited(best, None, _gain(records, controller, best)) if closer else Limited(controller, None, 0.0)
+        gain = _by_windup(records, controller, best)
+        found = Limited(best, None, gain, windup=gain, time_std=_time_std(records, best))
+        return found if gain > 0.0 else Limited(controller, None, 0.0)
     if all(comparable(r, controller) for r in records) and not not_followed(records, controller):
         return Limited(controller, None, 0.0)
     parts = [np.abs(before_filters(r.torque, controller, r.dt)) for r in records if r.torque is not None]
@@ -97,7 +101,37 @@ def limited(records: Sequence[Record], controller: Cascade) -> Limited:
         known = replace(controller, velocity=replace(controller.velocity, torque_limit=limit))
         return Limited(known, limit, _gain(records, controller, known), _spread(records, limit))
     best = _closest(records, controller, limit)
-    return Limited(best, limit, _gain(records, controller, best), _spread(records, limit))
+    same = replace(controller, velocity=replace(controller.velocity, torque_limit=limit))
+    windup, gain = _by_windup(records, same, best), _gain(records, controller, best)
+    return Limited(best, limit, gain, _spread(records, limit), windup, _time_std(records, best))
+
+
+def _by_windup(records: Sequence[Record], given: Cascade, best: Cascade) -> float:
+    """BIC units by which another anti-windup than the given one is better; 0 where it is not by the share of a number."""
+    if best.velocity == given.velocity or run_error(records, best) >= POLICY.each_number * run_error(records, given):
+        return 0.0
+    return _gain(records, given, best)
+
+
+def _time_std(records: Sequence[Record], best: Cascade) -> float:
+    """Deviation of a tracking time [s], by what is left and how the torque changes with it; 0 without one.
+
+    With what a velocity that goes straight between the lines would move it by.
+    """
+    time = best.velocity.tracking_time
+    if time is None:
+        return 0.0
+
+    def made(at: float, straight: bool = False) -> Vector:
+        one = replace(best, velocity=replace(best.velocity, tracking_time=at))
+        return np.concatenate([log_of(r, len(r), one, True).made(one, straight) for r in records])
+
+    slope = (made(time * NEXT_TIME) - made(time / NEXT_TIME)) / (time * NEXT_TIME - time / NEXT_TIME)
+    power = float(slope @ slope)
+    if not power > 0.0:
+        return float("inf")
+    moved = float(slope @ (made(time, straight=True) - made(time))) / power
+    return max(float(np.hypot(run_error(records, best) / np.sqrt(power), moved)), SUM_ROUNDING * time)
 
 
 def _closest(records: Sequence[Record], controller: Cascade, limit: float) -> Cascade:

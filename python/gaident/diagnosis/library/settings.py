@@ -4,7 +4,10 @@ from __future__ import annotations
 
 from types import MappingProxyType
 
-__all__ = ["OF_SETTING"]
+__all__ = ["ANTI_WINDUP", "OF_SETTING"]
+
+ANTI_WINDUP = "anti_windup"
+"""The finding of another anti-windup than the given one: what the integrator does at a limit is no effect of the library."""
 
 OF_SETTING = MappingProxyType(
     {
