@@ -97,6 +97,7 @@ _NUMBERED = re.compile(
 _IDN = re.compile(r"\b[SP](?:-\d+){2,}")  # S-0-0040 by itself
 _CAPITAL = re.compile(r"([^\W\d_A-Z])([A-Z])")
 _TYPE_PREFIX = re.compile(r"\b(?:f|lr)(?=[A-Z][a-z])")  # fActVelo, lrSetVelocity: a program's mark for the type of a number
+LONGEST_NAME = 1000  # no decision: a format: characters in which the words of a name are looked for
 _JOINTS = ("", "s", "en")  # Geschwindigkeit-s-sollwert, Moment-en-sollwert
 
 
@@ -108,7 +109,7 @@ def words_of(name: str) -> list[str]:
     >>> [words_of(name) for name in ("Motor speed [rpm]", "Solldrehzahl", "Geschwindigkeits-Istwert", "Torsion")]
     [['motor', 'speed'], ['soll', 'drehzahl'], ['geschwindigkeit', 'istwert'], ['torsion']]
     """
-    plain = _NUMBERED.sub("", _IDN.sub("", unicodedata.normalize("NFC", name)))
+    plain = _NUMBERED.sub("", _IDN.sub("", unicodedata.normalize("NFC", name[:LONGEST_NAME])))
     spaced = _CAPITAL.sub(r"\1 \2", _TYPE_PREFIX.sub("", re.sub(r"\[[^\]]*\]?|[<{].*", " ", plain)))
     found = [word.casefold() for word in re.findall(r"[^\W\d_]+", spaced)]
     parts = [part for word in found for part in _parts(word) or _parts(word.removesuffix("s")) or (word,)]

@@ -215,6 +215,9 @@ class _Gathered:
     def _look_for_time(self, values: NDArray[np.float64]) -> None:
         if not self.even or len(values) < 2:
             return
+        if not np.all(np.isfinite(values)):
+            self.even = False
+            return
         if self.samples == 0:
             self.first, self.rise = float(values[0]), float(values[-1] - values[0]) / (len(values) - 1)
         expected = self.first + self.rise * (self.samples + np.arange(len(values)))

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gaident.data.formats.mat import DamagedError, variables
-from gaident.data.formats.stored import Matrix, array_table
+from gaident.data.formats.stored import Matrix, array_table, check_unpacked
 from gaident.data.formats.table import LogTable, Stored, first_line
 from gaident.errors import ReadError
 
@@ -46,6 +46,7 @@ def read_npz(path: str, raw: bytes) -> LogTable:
         with np.load(io.BytesIO(raw), allow_pickle=False) as archive:
             if len(set(archive.files)) != len(archive.files):
                 raise ReadError(f"{path}: two arrays of one name in it; save the log again with one name for each")
+            check_unpacked(path, sum(member.file_size for member in archive.zip.infolist()), len(raw))
             for name in archive.files:
                 sort_array(name, np.asarray(archive[name]), arrays, others)
     except ReadError:

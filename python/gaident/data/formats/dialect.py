@@ -20,10 +20,11 @@ _DELIMITERS = (";", "\t", "|", ",", " ")
 _EXPONENT = r"(?:[eEdD][+-]?\d+)?"
 _SPECIAL = r"[+-]?(?:nan|inf|infinity)"
 _NUMBER = {
-    ".": re.compile(rf"[+-]?(?:\d+\.?\d*|\.\d+){_EXPONENT}|{_SPECIAL}", re.IGNORECASE),
+    ".": re.compile(rf"[+-]?(?:\d+(?:\.\d*)?|\.\d+){_EXPONENT}|{_SPECIAL}", re.IGNORECASE),
     # A digit must follow the comma, so that the separator in '1, 2' is none.
     ",": re.compile(rf"[+-]?(?:\d+(?:,\d+)?|,\d+){_EXPONENT}|{_SPECIAL}", re.IGNORECASE),
 }
+LONGEST_NUMBER = 400  # no decision: a format: characters; all digits of a float64 written out are 325
 _LEADING_ZERO = re.compile(r"0\d+")
 
 
@@ -52,7 +53,7 @@ class Dialect:
 
 def parse_number(text: str, decimal: str) -> float | None:
     """The number that `text` is, None if it is none."""
-    if _NUMBER[decimal].fullmatch(text) is None:
+    if len(text) > LONGEST_NUMBER or _NUMBER[decimal].fullmatch(text) is None:
         return None
     plain = text.replace(",", ".") if decimal == "," else text
     return float(plain.replace("d", "e").replace("D", "E"))
@@ -64,7 +65,10 @@ def split(text: str, delimiter: str) -> list[str]:
         skip = delimiter in " \t"
         blank_run = delimiter == " "
         source = re.sub(r"\s+", " ", text.strip()) if blank_run else text
-        cells = next(csv.reader([source], delimiter=delimiter, skipinitialspace=not skip), [])
+        try:
+            cells = next(csv.reader([source], delimiter=delimiter, skipinitialspace=not skip), [])
+        except csv.Error:  # a cell of more than 131 072 characters: no name and no number, whatever its quotation marks are
+            cells = source.split(delimiter)
         return [cell.strip() for cell in cells]
     cells = text.split() if delimiter == " " else text.split(delimiter)
     return [cell.strip() for cell in cells]
@@ -114,7 +118,7 @@ def _weigh(rows: list[list[str]], delimiter: str, decimal: str) -> tuple[Dialect
     numbers = texts = 0
     for column in zip(*table, strict=True):
         filled = [cell for cell in column if cell]
-        good = sum(pattern.fullmatch(cell) is not None for cell in filled)
+        good = sum(len(cell) <= LONGEST_NUMBER and pattern.fullmatch(cell) is not None for cell in filled)
         numeric.append(2 * good > len(filled))
         numbers += good
         texts += len(filled) - good

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterator, Sequence
 from contextlib import ExitStack
 from dataclasses import replace
@@ -31,7 +32,8 @@ def open_parquet(path: str, file: Path, stack: ExitStack) -> LogTable:
     except Exception as error:  # pyarrow's errors share no class
         raise ReadError(f"{path}: not a whole Parquet file ({first_line(error)}); copy it again, or export a CSV") from None
     names = [field.name for field in fields]
-    twice = next((name for name in names if names.count(name) > 1), None)
+    times = Counter(names)
+    twice = next((name for name in names if times[name] > 1), None)
     if twice is not None:
         raise ReadError(f"{path}: two columns are called {twice!r}; save the log again with one name for each")
     columns, others = [], []

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gaident.data.formats.stored import Matrix, array_table, library
+from gaident.data.formats.stored import Matrix, array_table, check_unpacked, library
 from gaident.data.formats.table import LogTable, Stored, first_line
 from gaident.errors import ReadError
 
@@ -27,8 +27,10 @@ def open_hdf(path: str, file: Path, stack: ExitStack) -> LogTable:
     h5py = library("h5py", "hdf5", path, "an HDF5 file (MAT of version 7.3 is one too)")
     try:
         root = stack.enter_context(h5py.File(file, "r"))
-        content = _Content(path, matlab=_is_matlab(file))
+        content = _Content(path, _is_matlab(file), file.stat().st_size)
         root.visititems(lambda name, node: content.add(name, node) if isinstance(node, h5py.Dataset) else None)
+    except ReadError:
+        raise
     except Exception as error:  # whatever a damaged file leads h5py into
         what, remedy = ("HDF5", "export a CSV") if not _is_matlab(file) else ("MAT 7.3", "save it with save('log.mat', '-v7')")
         raise ReadError(f"{path}: not a whole {what} file ({first_line(error)}); copy it again, or {remedy}") from None
@@ -44,8 +46,8 @@ def _is_matlab(file: Path) -> bool:
 class _Content:
     """The columns of an open file, sorted as they are found."""
 
-    def __init__(self, path: str, matlab: bool) -> None:
-        self.path, self.matlab = path, matlab
+    def __init__(self, path: str, matlab: bool, size: int) -> None:
+        self.path, self.matlab, self.bytes = path, matlab, size
         self.arrays: dict[str, NDArray[Any] | Stored | Matrix] = {}
         self.units: dict[str, str] = {}
         self.others: list[str] = []
@@ -56,6 +58,9 @@ class _Content:
             if name.startswith("#"):
                 return
             name = name.replace("/", ".")
+        if data.is_virtual or data.external:
+            raise ReadError(f"{self.path}: {name!r} lies in another file, which is never opened; copy it into this one")
+        check_unpacked(self.path, (data.size or 0) * data.dtype.itemsize, self.bytes)
         unit = next((_text(data.attrs[key]) for key in _UNIT_KEYS if key in data.attrs), None)
         if unit:
             self.units[name] = unit

@@ -21,6 +21,7 @@ COMMENT = re.compile(r"\s*(#|//|%)")
 _BRACKETS = re.compile(r"(.*\S)\s*[\[(<{]([^\])>}]+)[\])>}]")
 _NOTED = re.compile(r"(.*\S)\s*\[([^\]]+)\]\s*\S.*")  # n_ist [1/min] (smoothed)
 _AFTER = re.compile(r"(.*\S)\s+(?:/|in)\s+(\S.*)")
+LONGEST_TITLE = 1000  # no decision: a format: characters; a longer title is no name with a unit
 _ENCLOSED = re.compile(r"[\[(<{](.*)[\])>}]")
 
 
@@ -193,6 +194,8 @@ def _split_unit(cell: str) -> tuple[str, str | None]:
     Square brackets always contain a unit, unless a number (`w[0]`); what else is enclosed counts if it is a
     known unit. Of the others `name_and_unit` knows those that end a name: speed_rpm.
     """
+    if len(cell) > LONGEST_TITLE:
+        return cell, None
     for pattern in (_BRACKETS, _NOTED, _AFTER):
         match = pattern.fullmatch(cell)
         if match is None:

@@ -7,6 +7,7 @@ import io
 import math
 import sys
 import traceback
+from collections import Counter
 from contextlib import ExitStack, redirect_stdout
 from pathlib import Path
 from typing import Any
@@ -31,10 +32,10 @@ def open_tdms(path: str, file: Path, stack: ExitStack) -> LogTable:
         opened = stack.enter_context(nptdms.TdmsFile.open(file))
         channels = [channel for group in opened.groups() for channel in group.channels()]
         names = [channel.name for channel in channels]
-        columns, others = [], []
+        times, columns, others = Counter(names), [], []
         for channel in channels:
             long = f"{channel.group_name}/{channel.name}"
-            key = channel.name if names.count(channel.name) == 1 else long
+            key = channel.name if times[channel.name] == 1 else long
             if channel.dtype is None or np.dtype(channel.dtype).kind not in "iufbM" or len(channel) == 0:
                 others.append(f"{key!r} ({'empty' if len(channel) == 0 else channel.dtype})")
                 continue

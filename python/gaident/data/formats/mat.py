@@ -15,6 +15,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from gaident.data.formats.stored import MOST_TIMES, MOST_UNPACKED
+
 __all__ = ["DamagedError", "Variable", "variables"]
 
 Variable = tuple[str, "NDArray[Any] | str"]
@@ -44,11 +46,14 @@ def variables(raw: bytes) -> list[Variable]:
         raise DamagedError("the header of a MAT file is missing")
     order = "<" if raw[126:128] == b"IM" else ">"
     found: list[Variable] = []
+    room = max(MOST_UNPACKED, MOST_TIMES * len(raw))
     whole = _Elements(memoryview(raw), 128, order)
     while whole.more():
         kind, data = whole.next()
         if kind == _COMPRESSED:
-            kind, data = _Elements(memoryview(_inflate(data)), 0, order).next()
+            plain = _inflate(data, room)
+            room -= len(plain)
+            kind, data = _Elements(memoryview(plain), 0, order).next()
         if kind != _MATRIX:
             raise DamagedError(f"an element of type {kind} where a variable should be")
         found += _matrix(data, order, "", _DEEPEST)
@@ -98,12 +103,14 @@ class _Elements:
         return bytes(self.next()[1]).decode("latin-1")
 
 
-def _inflate(data: memoryview) -> bytes:
+def _inflate(data: memoryview, room: int) -> bytes:
     inflater = zlib.decompressobj()
     try:
-        plain = inflater.decompress(data)
+        plain = inflater.decompress(data, max(room, 1))
     except zlib.error as error:
         raise DamagedError(str(error)) from None
+    if inflater.unconsumed_tail:
+        raise DamagedError(f"it unpacks to more than {MOST_TIMES} times the file and {MOST_UNPACKED >> 20} MiB")
     if not inflater.eof:
         raise DamagedError("a compressed variable is cut")
     return plain

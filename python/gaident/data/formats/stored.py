@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib
 import logging
+from collections import Counter
 from collections.abc import Callable, Mapping
 from typing import Any
 
@@ -14,9 +15,11 @@ from gaident.data.formats.table import Column, LogTable, Stored
 from gaident.data.formats.unit_names import unit_of
 from gaident.errors import ReadError
 
-__all__ = ["Matrix", "array_table", "library", "midnight", "seconds_since", "unique_keys"]
+__all__ = ["Matrix", "array_table", "check_unpacked", "library", "midnight", "seconds_since", "unique_keys"]
 
-_LISTED_COLUMNS = 1000  # no decision: how many columns are listed  # no decision: how many columns are listed
+_LISTED_COLUMNS = 1000  # no decision: how many columns are listed
+MOST_UNPACKED = 1 << 28  # no decision: memory: bytes that a file may unpack to whatever its size
+MOST_TIMES = 20  # no decision: memory: and times its size
 
 
 class Matrix:
@@ -70,7 +73,18 @@ def _last_part(name: str) -> tuple[str, ...]:
 
 def unique_keys(names: list[str]) -> list[str]:
     """The names, those that are empty or that others have too with ` #k`, their number counted from 0."""
-    return [name if name and names.count(name) == 1 else f"{name} #{k}".strip() for k, name in enumerate(names)]
+    times = Counter(names)
+    return [name if name and times[name] == 1 else f"{name} #{k}".strip() for k, name in enumerate(names)]
+
+
+def check_unpacked(path: str, unpacked: int, packed: int) -> None:
+    """Raises ReadError for a file of `packed` bytes that stands for so many more that no log of a drive does."""
+    most = max(MOST_UNPACKED, MOST_TIMES * packed)
+    if unpacked > most:
+        raise ReadError(
+            f"{path}: its {packed} bytes unpack to {unpacked} or more, which is beyond {MOST_TIMES} times the file and "
+            f"{MOST_UNPACKED >> 20} MiB; save the log without what repeats, or in parts"
+        )
 
 
 def library(module: str, extra: str, path: str, what: str) -> Any:

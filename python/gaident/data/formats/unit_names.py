@@ -17,6 +17,7 @@ _ENDS = (
     (r"m(?:/|[\s_]?per[\s_]?|_)(s|min)", r"m/\1"),
     (rf"mm{_PER}min", "mm/min"),
 )
+LONGEST_NAME = 1000  # no decision: a format: characters; a longer name has no unit at its end
 _PATTERNS = tuple(
     (re.compile(rf"(.*[^\s_-])[\s_-]+({end})", re.IGNORECASE), re.compile(end, re.IGNORECASE), unit) for end, unit in _ENDS
 )
@@ -30,6 +31,8 @@ def name_and_unit(name: str) -> tuple[str, str] | None:
     >>> [name_and_unit(name) for name in ("speed_rpm", "pos_cmd_deg", "vel_rad_s", "v_mm_per_s", "torque_pct", "i_a")]
     [('speed', 'rpm'), ('pos_cmd', 'deg'), ('vel', 'rad/s'), ('v', 'mm/s'), ('torque', '%'), None]
     """
+    if len(name) > LONGEST_NAME:
+        return None
     for pattern, alone, unit in reversed(_PATTERNS):
         found = pattern.fullmatch(name)
         if found is not None:

@@ -1,0 +1,120 @@
+"""Small files that stand for much: read or refused in seconds, within bounds of memory, and never by opening another file."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+import time
+import zipfile
+import zlib
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import gaident as ga
+from gaident.errors import ReadError
+
+ROWS = "".join(f"{k * 1e-3:.3f},{k % 7},{k % 5}\n" for k in range(40))
+HEAD = "t,torque,velocity"
+
+TEXTS = {
+    "digits in a cell": f"{HEAD}\n{'1' * 40_000},1,2\n{ROWS}",
+    "digits that are no number": f"{HEAD}\n{ROWS}{'1' * 40_000}x,1,2\n",
+    "digits in a title": f"{HEAD} [{'1' * 40_000}]\n{ROWS}",
+    "square brackets": f"{HEAD}{'[' * 100_000}\n{ROWS}",
+    "round brackets": f"{HEAD}{'(' * 100_000}\n{ROWS}",
+    "pairs of brackets": f"{HEAD}{'[]' * 50_000}\n{ROWS}",
+    "behind an open bracket": f"{HEAD} [{'a ' * 100_000}\n{ROWS}",
+    "underlines": f"{HEAD}{'_' * 100_000}rad{'_' * 100_000}x\n{ROWS}",
+    "a quoted title": f'{HEAD[:-8]}"velocity{"a" * 140_000}"\n{ROWS}',
+    "a quoted cell": f'{HEAD}\n0,"{"a" * 140_000}",1\n{ROWS}',
+    "blanks": f"{' ' * 200_000}{HEAD}\n{ROWS}",
+    "columns": ",".join([HEAD, *["a"] * 20_000]) + "\n" + "".join(f"{k},1,2{',1' * 20_000}\n" for k in range(25)),
+}
+
+
+@pytest.mark.parametrize("name", TEXTS)
+def test_a_text_takes_no_minutes(name: str, tmp_path: Path) -> None:
+    """100 000 brackets in a title, or 40 000 digits before a letter, took minutes."""
+    path = tmp_path / "log.csv"
+    path.write_text(TEXTS[name])
+    began = time.perf_counter()
+    for read in (ga.columns, lambda p: ga.read(p, {"torque": "torque", "velocity": "velocity"}, dt=1e-3)):
+        try:
+            assert repr(read(path))
+        except ReadError as error:
+            assert "\n" not in str(error)
+    assert time.perf_counter() - began < 10.0
+
+
+LIMITED = """
+import resource, sys
+import gaident as ga
+ga.columns(sys.argv[2])
+resource.setrlimit(resource.RLIMIT_AS, (3 << 30, 3 << 30))
+try:
+    ga.read(sys.argv[1], {"torque": "torque", "velocity": "velocity"}, dt=1e-3)
+except ga.errors.ReadError as error:
+    print(error)
+print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss)
+"""
+
+
+def npz(path: Path) -> None:
+    """Two arrays of 800 MB of zeros, in a file of 1.6 MB."""
+    with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive:
+        for name in ("torque", "velocity"):
+            with archive.open(f"{name}.npy", "w", force_zip64=True) as member:
+                np.lib.format.write_array_header_1_0(member, {"descr": "<f8", "fortran_order": False, "shape": (100_000_000,)})
+                for _ in range(100):
+                    member.write(bytes(8_000_000))
+
+
+def mat(path: Path) -> None:
+    """A compressed variable that unpacks to 2 GB."""
+    packer = zlib.compressobj()
+    packed = b"".join(packer.compress(bytes(10_000_000)) for _ in range(200)) + packer.flush()
+    head = b"MATLAB 5.0 MAT-file".ljust(124) + b"\x00\x01IM"
+    path.write_bytes(head + np.array([15, len(packed)], "<u4").tobytes() + packed)
+
+
+def hdf(path: Path) -> None:
+    """Two datasets of 4 GB that contain nothing but what they are filled with, in 2 kB."""
+    h5py = pytest.importorskip("h5py")
+    with h5py.File(path, "w") as file:
+        for name in ("torque", "velocity"):
+            file.create_dataset(name, shape=(500_000_000,), dtype="f8", chunks=(1_000_000,), fillvalue=1.0)
+
+
+@pytest.mark.parametrize("make", [npz, mat, hdf])
+def test_a_file_that_unpacks_to_gigabytes_is_refused(make: Callable[[Path], None], tmp_path: Path) -> None:
+    path, plain = tmp_path / f"log.{make.__name__.replace('hdf', 'h5')}", tmp_path / "plain.csv"
+    make(path)
+    plain.write_text(f"{HEAD}\n{ROWS}")
+    done = subprocess.run([sys.executable, "-c", LIMITED, path, plain], capture_output=True, text=True, timeout=60)
+    said, kilobytes = done.stdout.splitlines()
+    assert "20 times the file" in said, done.stderr
+    assert int(kilobytes) < 1 << 20
+
+
+def test_data_in_another_file_are_never_read(tmp_path: Path) -> None:
+    """HDF5 may name any file as the place of a dataset, or a pipe, for which it waits for ever."""
+    h5py: Any = pytest.importorskip("h5py")
+    secret = tmp_path / "secret"
+    secret.write_bytes(np.arange(100.0).tobytes())
+    path = tmp_path / "log.h5"
+    with h5py.File(path, "w") as file:
+        file.create_dataset("velocity", (100,), "f8", external=[(str(secret), 0, 800)])
+    with pytest.raises(ReadError, match="'velocity' lies in another file, which is never opened"):
+        ga.columns(path)
+    with h5py.File(tmp_path / "part.h5", "w") as file:
+        file["torque"] = np.arange(100.0)
+    layout = h5py.VirtualLayout((100,), "f8")
+    layout[:] = h5py.VirtualSource(tmp_path / "part.h5", "torque", (100,))
+    with h5py.File(path, "w") as file:
+        file.create_virtual_dataset("torque", layout)
+    with pytest.raises(ReadError, match="'torque' lies in another file"):
+        ga.read(path, {"torque": "torque", "velocity": "torque"}, dt=1e-3)
