@@ -18,7 +18,7 @@ from gaident.data.readers import read
 from gaident.data.record import CHANNELS, Record
 from gaident.drive import kinds
 from gaident.drive.controller_section import CONTROLLER_KEYS, controller_of, proportional_gain_of
-from gaident.drive.quantities import INTEGRAL_TIME
+from gaident.drive.quantities import INTEGRAL_TIMES
 from gaident.errors import ReadError, SettingsError, SpaceError
 from gaident.identification.closed_loop import looped_over, space_of
 from gaident.models.search_space import SearchSpace
@@ -148,7 +148,8 @@ class Drive:
             return None
         if self.columns.get("command") != "" and "drive" not in values:
             remedy = 'or give --kp and --ki ("unknown" where a torque is logged), or --loop open to work from torque to velocity'
-            self._refuse_unfilled("controller", ("kp", *(() if INTEGRAL_TIME in values else ("ki",))), remedy)
+            integral = () if any(key in values for key in INTEGRAL_TIMES) else ("ki",)
+            self._refuse_unfilled("controller", ("kp", *integral), remedy)
         return controller_of(values, self.general) if values else None
 
     def proportional_gain(self) -> float | None:

@@ -16,10 +16,10 @@ from gaident.control.unknown import UNITS
 from gaident.control.words import UNKNOWN
 from gaident.errors import ControllerError, GaidentError, ReadError
 
-__all__ = ["INERTIA", "INTEGRAL_TIME", "number_or_unit", "si_number"]
+__all__ = ["INERTIA", "INTEGRAL_TIMES", "number_or_unit", "si_number"]
 
-INTEGRAL_TIME, INERTIA = "tn", "total_inertia"
-"""Keys of the file that are no arguments of a controller: ki = kp/tn, and the inertia of a gain in 1/s."""
+INTEGRAL_TIMES, INERTIA = ("tn", "ti"), "total_inertia"
+"""Keys of the file that are no arguments of a controller: ki = kp/tn (or kp/ti), and the inertia of a gain in 1/s."""
 
 Factor = tuple[float, str]  # to SI, and the constant that it is multiplied by; "": none
 _LISTED = 10  # no decision: how many units a message names
@@ -47,7 +47,7 @@ _UNITS: dict[str, dict[str, Factor]] = {
         **{"1/s": (1.0, INERTIA), "rad/s": (1.0, INERTIA), "Hz": (math.tau, INERTIA)},
     },
     "ki": {**_per(_TORQUES, _PER_ANGLE), **_per(_FORCES, {"/m": 1.0})},
-    INTEGRAL_TIME: _TIMES,
+    **dict.fromkeys(INTEGRAL_TIMES, _TIMES),
     "command_weight": _SHARES,
     **{key: {**_TORQUES, **_FORCES} for key in ("torque_limit", "integrator_limit", "friction_feedforward")},
     **dict.fromkeys(("period", "position_period", "delay", "tracking_time", "time_constant"), _TIMES),
