@@ -30,7 +30,7 @@ __all__ = ["COLUMNS", "KEYS", "Drive", "axes_in", "read_drive_file", "unfilled_o
 COLUMNS = (*CHANNELS, "voltage", "current", "time")
 CONSTANTS = (
     *("counts_per_turn", "torque_constant", "rated_torque", "torque_per_volt"),
-    *("resistance", "inductance", "back_emf_constant"),
+    *("resistance", "inductance", "back_emf_constant", "reference_speed"),
 )
 RANGES = ("inertia", "resonance_hz", "damping", "gain", "real", "imaginary", "p", "q")
 
@@ -42,6 +42,7 @@ KEYS: dict[str, dict[str, kinds.Check]] = {
         "dt": kinds.number,
         "velocity_cutoff_hz": kinds.number,
         **dict.fromkeys(CONSTANTS, kinds.number),
+        "reference_speed": kinds.speed,
         "screw": kinds.length,
         "gear_ratio": kinds.positive,
         "load_side": kinds.channels,

@@ -80,6 +80,10 @@ CASES: dict[str, tuple[str, ga.PI | ga.Cascade]] = {
         '[controller]\nkp = "200 1/s"\ntotal_inertia = "1 kg cm^2"\ntn = 0.01\n',
         ga.PI(0.02, 2.0),
     ),
+    "percent of the rated torque per percent of the reference speed": (
+        'rated_torque = 3.0\nreference_speed = "3000 rpm"\n[controller]\nkp = "5 %/%"\nki = 2\n',
+        ga.PI(15.0 / (3000 * (2 * np.pi / 60)), 2.0),
+    ),
     "percent of the rated torque per rpm": (
         'rated_torque = 3.0\n[controller]\nkp = "0.5 %/rpm"\nki = "0.01 N·m/rad"\n',
         ga.PI(0.005 * 3.0 / (2 * np.pi / 60), 0.01),
@@ -116,6 +120,7 @@ WRONG = {
     "unit of another": ('kp = 1\nki = 1\ntorque_limit = "3 Nm s"', "give one of N m, A, mA"),
     "no torque constant": ('kp = "0.12 A s/rad"\nki = 1', "which needs torque_constant: give it above the first section"),
     "no inertia": ('kp = "200 1/s"\nki = 1', "which needs total_inertia: give it in [controller]"),
+    "no speed": ('kp = "5 %/%"\nki = 1', "which needs rated_torque: give it above the first section"),
     "unkown": ('kp = "unkown"\nki = 1', "did you mean 'unknown'?"),
     "no number": ('kp = "much"\nki = 1', "a number with its unit (N m s/rad, A s/rad, mA s/rad, % s/rad"),
     "a limit is known": ('kp = 1\nki = 1\ntorque_limit = "unknown"', "torque_limit is 'unknown': give one number"),
