@@ -41,7 +41,10 @@ def _meant(unit: str, constants: Constants, axis: str, text: str) -> tuple[str, 
     """(the quantity that is measured in a unit, its SI value)."""
     if not unit:
         return QUANTITIES[0], 1.0
-    for name in QUANTITIES:
+    # What both are measured in (%) is of the torque, but where only the speed at 100 % is known.
+    of_speed = constants.rated_torque is None and constants.reference_speed is not None
+    both = all(is_unit(unit, name) for name in QUANTITIES)
+    for name in QUANTITIES if of_speed or not both else reversed(QUANTITIES):
         if is_unit(unit, name) and not of_other_axis(name, unit, axis):
             return name, factor(name, unit, constants)
     listed = ", ".join(unit for name in QUANTITIES for unit in known_units(name, axis))

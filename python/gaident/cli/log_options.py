@@ -49,6 +49,7 @@ CONSTANT_HELP = {
     "counts_per_turn": "encoder counts per turn of the motor, for units of counts",
     "torque_constant": "[N m/A], for a torque in A",
     "rated_torque": "what 100 %% means [N m], for a torque in %%",
+    "reference_speed": "what 100 %% of a speed means [rad/s], for a velocity or command in %%",
     "torque_per_volt": "[N m/V], for a torque in V",
     "resistance": "of the winding [Ohm], with --torque-constant for a torque from a voltage",
     "inductance": "of the winding [H] (default: 0)",

@@ -17,6 +17,7 @@ SAME_NAME = {
         "torque_constant",
         "rated_torque",
         "torque_per_volt",
+        "reference_speed",
         "resistance",
         "inductance",
         "gear_ratio",

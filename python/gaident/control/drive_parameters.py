@@ -284,10 +284,20 @@ def _values(
     missing = [f"{p.name} [{p.unit}] ({p.meaning})" for p in needed if p.name not in given]
     if missing:
         raise ControllerError(f"the drive {drive!r} lacks {', '.join(missing)}: give it as the drive shows it")
-    values = {p.name: real_number(given[p.name], p.name, ControllerError) for p in needed}
+    values = {p.name: _as_shown(p, given[p.name]) for p in needed}
     for p in needed:
         value = values[p.name]
+        if p.unit == "1" and not value.is_integer():
+            raise ControllerError(f"{p.name} is {value:g}: give a whole number, {p.meaning}")
         if value < 0.0 or (value == 0.0 and p.name not in may_be_zero):
             least = ">= 0" if p.name in may_be_zero else "> 0"
             raise ControllerError(f"{p.name} is {value:g}: give a number {least} [{p.unit}], as the drive shows it")
     return values
+
+
+def _as_shown(p: DriveParameter, value: object) -> float:
+    """The number that was given for a parameter; ControllerError for what is none, true and false among it."""
+    remedy = f"give one finite number [{p.unit}] ({p.meaning}), as the drive shows it"
+    if isinstance(value, bool):
+        raise ControllerError(f"{p.name} is {value!r}: {remedy}")
+    return real_number(value, p.name, ControllerError, remedy)

@@ -90,6 +90,7 @@ def read(
     inductance: float | None = None,
     back_emf_constant: float | None = None,
     screw: float | None = None,
+    reference_speed: float | None = None,
     velocity_cutoff_hz: float | None = None,
     decimate: int = 1,
     resample: float | None = None,
@@ -145,6 +146,8 @@ def read(
         ke = kt. Of voltage and current without a `torque_constant` the winding is estimated, and a note says so.
     screw : float, optional
         Length that a turn of the motor moves [m]: what is logged in mm, mm/min or N becomes angle, speed and torque of the motor.
+    reference_speed : float, optional
+        Speed that is 100 % [rad/s], for a velocity or command in %, per mille or 4000 hex.
     velocity_cutoff_hz : float, optional
         Corner [Hz].
         The velocity of a log that has a position and none is the difference of the position;
@@ -219,6 +222,7 @@ def read(
         inductance=inductance,
         back_emf_constant=back_emf_constant,
         screw=screw,
+        reference_speed=reference_speed,
         velocity_cutoff_hz=velocity_cutoff_hz,
         decimate=decimate,
         resample=resample,

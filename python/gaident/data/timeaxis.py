@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -19,6 +21,8 @@ _BLOCK = 64  # no decision: memory; stamps of a block
 _DIGITS = 16  # no decision: rounding: decimals of a double
 _SINGLE_PRINTED = 6e-9  # no decision: rounding
 """Relative error of a single-precision number printed with its nine digits."""
+_BY_CHANCE = 0.05  # no decision: rounding
+"""A period of few digits is the exact one where the stamps tell it this much finer than its last digit."""
 
 
 class TimeAxis:
@@ -36,6 +40,7 @@ class TimeAxis:
         """
         self.column, self.second, self.given, self.strict = column, second, given, strict
         self.count, self.start, self.last, self.step, self.rounding = 0, 0.0, 0.0, 0.0, 0.0
+        self.ends = [0.0, 0.0]  # the last printed digit of the first and the last stamp
 
     def push(self, table: LogTable, t: NDArray[np.float64]) -> None:
         """The time stamps of the rows of `table`. Raises ReadError with line, jump and remedy."""
@@ -44,6 +49,8 @@ class TimeAxis:
         shift = int(self.count > 0)
         if self.count == 0:
             self.start = float(t[0])
+            self.ends[0] = float(_printed_step(t)[0])
+        self.ends[1] = float(_printed_step(t[-_BLOCK:])[-1])
         self.count += t.size
         whole = np.concatenate([[self.last], t]) if shift else t
         self.last = float(t[-1])
@@ -57,12 +64,16 @@ class TimeAxis:
             self._check_rows(table, whole, shift)
 
     def sample_time(self, table: LogTable) -> float:
-        """dt [s]: (t(n-1) - t(0)) / (n - 1)."""
+        """dt [s]: (t(n-1) - t(0)) / (n - 1), or the period of few digits that the stamps were rounded from.
+
+        A drive that counts its time in single precision writes 19959.999 ms after 499 steps of 40 ms.
+        """
         if self.count < 2:
             raise ReadError.at(table.path, f"time column {self.column.key!r} has {self.count} value", "give a longer log")
         # The mean is free of the rounding that the median keeps; 12 digits drop the noise of the division.
-        mean = (self.last - self.start) / (self.count - 1) * self.second
-        return float(f"{mean:.12g}")
+        steps = self.count - 1
+        mean = (self.last - self.start) / steps
+        return float(f"{_of_few_digits(mean, sum(self.ends) / steps) * self.second:.12g}")
 
     def _check_rows(self, table: LogTable, t: NDArray[np.float64], shift: int) -> None:
         """Each step is one sample, whatever the clock's jitter: raises ReadError for rows that are lost or there twice."""
@@ -110,6 +121,20 @@ class TimeAxis:
                     _refuse(table, self.column, t, int(np.argmax(unequal)), self.second, shift)
                 _too_coarse(table, self.column, float(rounding.max()))
         self.step = usual
+
+
+def _of_few_digits(mean: float, doubt: float) -> float:
+    """The number of fewest digits within `doubt` of the mean, where that is not by chance; else the mean."""
+    if not 0.0 < doubt < mean:
+        return mean
+    for digits in range(1, _DIGITS):
+        short = float(f"{mean:.{digits - 1}e}")
+        last_digit = 10.0 ** (math.floor(math.log10(mean)) - digits + 1)
+        if doubt > _BY_CHANCE * last_digit:
+            return mean
+        if abs(short - mean) <= doubt:
+            return short
+    return mean
 
 
 def _check_given(table: LogTable, column: Column, found: float, second: float, dt: float) -> None:

@@ -12,7 +12,7 @@ from gaident.control.filters import LowPass, Notch, filter_of
 from gaident.control.pi import DIGITAL, PI
 from gaident.control.words import UNKNOWN
 from gaident.drive.kinds import Check, number, text
-from gaident.drive.quantities import INERTIA, INTEGRAL_TIME, number_or_unit, si_number
+from gaident.drive.quantities import INERTIA, INTEGRAL_TIMES, number_or_unit, si_number
 from gaident.errors import ControllerError, ReadError
 
 __all__ = ["CONTROLLER_KEYS", "controller_of", "proportional_gain_of"]
@@ -55,7 +55,7 @@ OF_DRIVES = tuple(
 )
 CONTROLLER_KEYS: dict[str, Check] = {
     **PI_KEYS,
-    **dict.fromkeys((INTEGRAL_TIME, INERTIA), number_or_unit),
+    **dict.fromkeys((*INTEGRAL_TIMES, INERTIA), number_or_unit),
     "drive": text,
     **AROUND,
     **dict.fromkeys(OF_DRIVES, number),
@@ -83,20 +83,20 @@ def _in_si(given: Values, general: Values) -> dict[str, Any]:
         if (PI_KEYS | AROUND).get(key) is number_or_unit
         else value
         for key, value in given.items()
-        if key not in (INTEGRAL_TIME, INERTIA)
+        if key not in (*INTEGRAL_TIMES, INERTIA)
     }
-    if INTEGRAL_TIME in given:
-        if "ki" in values or "drive" in values:
-            other = "ki" if "ki" in values else "the gains of a drive"
-            raise ControllerError(f"the controller has {INTEGRAL_TIME} and {other}: give the one or the other")
-        kp, time = values.get("kp"), si_number(given[INTEGRAL_TIME], INTEGRAL_TIME, constants)
+    times = [key for key in INTEGRAL_TIMES if key in given]
+    if times:
+        key, *second = times
+        if second or "ki" in values or "drive" in values:
+            other = second[0] if second else "ki" if "ki" in values else "the gains of a drive"
+            raise ControllerError(f"the controller has {key} and {other}: give the one or the other")
+        kp, time = values.get("kp"), si_number(given[key], key, constants)
         assert time is not None
         if kp is None:
-            raise ControllerError(
-                f'{INTEGRAL_TIME} is given without kp, of which ki = kp/{INTEGRAL_TIME}: give kp, or ki = "{UNKNOWN}"'
-            )
+            raise ControllerError(f'{key} is given without kp, of which ki = kp/{key}: give kp, or ki = "{UNKNOWN}"')
         if not time > 0.0:
-            raise ControllerError(f"{INTEGRAL_TIME} is {given[INTEGRAL_TIME]!r}: give a time > 0, or ki = 0 without an integral")
+            raise ControllerError(f"{key} is {given[key]!r}: give a time > 0, or ki = 0 without an integral")
         values["ki"] = kp / time
     return values
 

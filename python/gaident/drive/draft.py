@@ -26,6 +26,7 @@ _SI = {"command": "rad/s", "velocity": "rad/s", "torque": "N m", "position": "ra
 _CONSTANTS = {
     "rated_torque": ("2.4", say("{N m} at 100 %")),
     "torque_constant": ("0.05", say("{N m/A}")),
+    "reference_speed": ("314.16", say("{rad/s} at 100 %")),
     "torque_per_volt": ("0.24", say("{N m/V}")),
     "counts_per_turn": ("4096", Text("encoder counts per turn of the motor")),
 }
@@ -382,7 +383,7 @@ def _factor(channel: str, unit: str | None) -> float | None:
     if unit is None:
         return None
     try:
-        return factor(channel, unit, Constants(1.0, 1.0, 1.0, 1.0))
+        return factor(channel, unit, Constants(1.0, 1.0, 1.0, 1.0, reference_speed=1.0))
     except ReadError:
         return None
 

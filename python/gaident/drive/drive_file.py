@@ -18,7 +18,7 @@ from gaident.data.readers import read
 from gaident.data.record import CHANNELS, Record
 from gaident.drive import kinds
 from gaident.drive.controller_section import CONTROLLER_KEYS, controller_of, proportional_gain_of
-from gaident.drive.quantities import INTEGRAL_TIME
+from gaident.drive.quantities import INTEGRAL_TIMES
 from gaident.errors import ReadError, SettingsError, SpaceError
 from gaident.identification.closed_loop import looped_over, space_of
 from gaident.models.search_space import SearchSpace
@@ -30,7 +30,7 @@ __all__ = ["COLUMNS", "KEYS", "Drive", "axes_in", "read_drive_file", "unfilled_o
 COLUMNS = (*CHANNELS, "voltage", "current", "time")
 CONSTANTS = (
     *("counts_per_turn", "torque_constant", "rated_torque", "torque_per_volt"),
-    *("resistance", "inductance", "back_emf_constant"),
+    *("resistance", "inductance", "back_emf_constant", "reference_speed"),
 )
 RANGES = ("inertia", "resonance_hz", "damping", "gain", "real", "imaginary", "p", "q")
 
@@ -42,6 +42,7 @@ KEYS: dict[str, dict[str, kinds.Check]] = {
         "dt": kinds.number,
         "velocity_cutoff_hz": kinds.number,
         **dict.fromkeys(CONSTANTS, kinds.number),
+        "reference_speed": kinds.speed,
         "screw": kinds.length,
         "gear_ratio": kinds.positive,
         "load_side": kinds.channels,
@@ -148,7 +149,8 @@ class Drive:
             return None
         if self.columns.get("command") != "" and "drive" not in values:
             remedy = 'or give --kp and --ki ("unknown" where a torque is logged), or --loop open to work from torque to velocity'
-            self._refuse_unfilled("controller", ("kp", *(() if INTEGRAL_TIME in values else ("ki",))), remedy)
+            integral = () if any(key in values for key in INTEGRAL_TIMES) else ("ki",)
+            self._refuse_unfilled("controller", ("kp", *integral), remedy)
         return controller_of(values, self.general) if values else None
 
     def proportional_gain(self) -> float | None:

@@ -12,7 +12,7 @@ from gaident.data.torque_kind import TORQUE_KINDS, TORQUE_LOGS
 from gaident.errors import ReadError
 
 __all__ = [
-    *("Check", "axis", "channels", "column", "length", "number", "pair", "pair_or_one", "positive", "text"),
+    *("Check", "axis", "channels", "column", "length", "speed", "number", "pair", "pair_or_one", "positive", "text"),
     *("torque_is", "torque_log", "unit", "whole", "yes_or_no"),
 ]
 
@@ -92,6 +92,17 @@ def length(value: object, name: str) -> float:
             return positive(float(number_) * factor("position", unit_.strip()), name)
         except (ValueError, ReadError):
             raise ReadError(f'{name} is {value!r}: give a length in m, or with its unit, "24 mm"') from None
+    return positive(value, name)
+
+
+def speed(value: object, name: str) -> float:
+    """A speed in rad/s or m/s; with its unit, "3000 rpm", too."""
+    if isinstance(value, str):
+        number_, _, unit_ = value.strip().partition(" ")
+        try:
+            return positive(float(number_) * factor("velocity", unit_.strip()), name)
+        except (ValueError, ReadError):
+            raise ReadError(f'{name} is {value!r}: give a speed in rad/s (linear: m/s), or with its unit, "3000 rpm"') from None
     return positive(value, name)
 
 

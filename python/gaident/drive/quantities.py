@@ -16,12 +16,12 @@ from gaident.control.unknown import UNITS
 from gaident.control.words import UNKNOWN
 from gaident.errors import ControllerError, GaidentError, ReadError
 
-__all__ = ["INERTIA", "INTEGRAL_TIME", "number_or_unit", "si_number"]
+__all__ = ["INERTIA", "INTEGRAL_TIMES", "number_or_unit", "si_number"]
 
-INTEGRAL_TIME, INERTIA = "tn", "total_inertia"
-"""Keys of the file that are no arguments of a controller: ki = kp/tn, and the inertia of a gain in 1/s."""
+INTEGRAL_TIMES, INERTIA = ("tn", "ti"), "total_inertia"
+"""Keys of the file that are no arguments of a controller: ki = kp/tn (or kp/ti), and the inertia of a gain in 1/s."""
 
-Factor = tuple[float, str]  # to SI, and the constant that it is multiplied by; "": none
+Factor = tuple[float, str]  # to SI, and the constant that it is multiplied by, behind a space one that divides it; "": none
 _LISTED = 10  # no decision: how many units a message names
 _RPM = math.tau / 60.0  # no decision: a unit; rad/s
 _CURRENTS: dict[str, Factor] = {"A": (1.0, "torque_constant"), "mA": (1e-3, "torque_constant")}
@@ -44,10 +44,11 @@ _UNITS: dict[str, dict[str, Factor]] = {
     "kp": {
         **_per(_TORQUES, _PER_SPEED),
         **_per(_FORCES, _PER_LINEAR_SPEED),
+        **{"%/%": (1.0, "rated_torque reference_speed"), "‰/‰": (1.0, "rated_torque reference_speed")},
         **{"1/s": (1.0, INERTIA), "rad/s": (1.0, INERTIA), "Hz": (math.tau, INERTIA)},
     },
     "ki": {**_per(_TORQUES, _PER_ANGLE), **_per(_FORCES, {"/m": 1.0})},
-    INTEGRAL_TIME: _TIMES,
+    **dict.fromkeys(INTEGRAL_TIMES, _TIMES),
     "command_weight": _SHARES,
     **{key: {**_TORQUES, **_FORCES} for key in ("torque_limit", "integrator_limit", "friction_feedforward")},
     **dict.fromkeys(("period", "position_period", "delay", "tracking_time", "time_constant"), _TIMES),
@@ -79,7 +80,8 @@ def number_or_unit(value: object, name: str) -> float | str:
 def si_number(value: Any, name: str, constants: Mapping[str, Any]) -> float | None:
     """The number in SI of what stands below a key; None where it is not known.
 
-    constants: what of torque_constant [N m/A], rated_torque [N m] and total_inertia [kg m^2] is given. Raises ControllerError.
+    constants: what of torque_constant [N m/A], rated_torque [N m], reference_speed [rad/s] and total_inertia [kg m^2] is given.
+    Raises ControllerError.
     """
     if not isinstance(value, str):
         return real_number(value, name, ControllerError)
@@ -88,10 +90,13 @@ def si_number(value: Any, name: str, constants: Mapping[str, Any]) -> float | No
     number, unit = _parts(value)
     _refuse_other_axis(value, name, unit, str(constants.get("axis", "rotary")))
     size, constant = _units(name)[_spelling(unit)]
-    if constant and constants.get(constant) is None:
-        where = "in [controller]" if constant == INERTIA else "above the first section"
-        raise ControllerError(f"{name} is {value!r}, which needs {constant}: give it {where}")
-    return number * size * (float(constants[constant]) if constant else 1.0)
+    needed = constant.split()
+    for one in needed:
+        if constants.get(one) is None:
+            where = "in [controller]" if one == INERTIA else "above the first section"
+            raise ControllerError(f"{name} is {value!r}, which needs {one}: give it {where}")
+    times, *over = [float(constants[one]) for one in needed] or [1.0]
+    return number * size * times / (over[0] if over else 1.0)
 
 
 def _refuse_other_axis(value: str, name: str, unit: str, axis: str) -> None:

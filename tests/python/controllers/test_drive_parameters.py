@@ -98,7 +98,18 @@ REFUSED = {
     ),
     "zero time": ("sinamics", {"p1460": 0.02, "p1462": 0.0}, r"p1462 is 0: give a number > 0 \[ms\]"),
     "negative": ("sinamics", {"p1460": -0.02, "p1462": 10.0}, "p1460 is -0.02: give a number > 0"),
-    "text": ("sinamics", {"p1460": "0.02", "p1462": 10.0}, "p1460 is '0.02'"),
+    "text": ("sinamics", {"p1460": "0.02", "p1462": 10.0}, r"p1460 is '0.02': give one finite number \[N m s/rad\]"),
+    "truth": ("sinamics", {"p1460": True, "p1462": 10.0}, r"p1460 is True: give one finite number \[N m s/rad\]"),
+    "nothing": ("sinamics", {"p1460": 0.02, "p1462": None}, r"p1462 is None: give one finite number \[ms\] \(speed controller"),
+    "not finite": ("sinamics", {"p1460": 0.02, "p1462": math.inf}, r"p1462 is inf: give one finite number \[ms\]"),
+    "a list": ("sinamics", {"p1460": [0.02], "p1462": 10.0}, r"p1460 is \[0.02\]: give one finite number"),
+    "half a pole pair": (
+        "vesc",
+        {"s_pid_kp": 1, "s_pid_ki": 0, "l_current_max": 60, "pole_pairs": 7.5, "torque_constant": 0.02},
+        "pole_pairs is 7.5: give a whole number, of the motor",
+    ),
+    "no drive": (None, {"p1460": 0.02, "p1462": 10.0}, "drive is None: it must be one of sinamics"),
+    "limit": ("sinamics", {"p1460": 0.02, "p1462": 10.0, "torque_limit": -1}, "torque_limit is -1: give a number > 0"),
     "gain": ("sinamics", {"kp": 0.02, "p1460": 0.1, "p1462": 10.0}, "has the key 'kp'"),
 }
 
@@ -115,6 +126,10 @@ def test_a_position_gain_that_is_not_known_is_refused() -> None:
         ga.P.from_drive("vesc", kp=1.0)
     with pytest.raises(ControllerError, match="lacks pos_gain"):
         ga.P.from_drive("odrive")
+    with pytest.raises(ControllerError, match=r"s_0_0104 is True: give one finite number \[1000/min\]"):
+        ga.P.from_drive("ax5000", s_0_0104=True)
+    with pytest.raises(ControllerError, match=r"s_0_0104 is 0: give a number > 0 \[1000/min\]"):
+        ga.P.from_drive("ax5000", s_0_0104=0)
 
 
 def test_the_page_is_what_the_table_says() -> None:

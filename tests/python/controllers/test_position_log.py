@@ -158,3 +158,17 @@ def test_rounded_positions_are_no_other_controller() -> None:
     assert replay(log.with_channels(**rounded), cascade).follows
     other = ga.Cascade(ga.PI(0.7, 30.0), period=dt, position=ga.P(60.0), velocity_feedforward=0.98)
     assert not replay(log.with_channels(**rounded), other).follows
+
+
+@pytest.mark.parametrize(("kp", "kd"), [(40.0, 1.2), (0.5, 0.03)])
+def test_the_law_of_a_robots_joint_is_a_cascade_without_an_integral(kp: float, kd: float) -> None:
+    """u = kp (q* - q) + kd (v* - w), v* the slope of q* over the coming sample, as docs/controllers.md says."""
+    dt = 1e-3
+    target = 0.3 * np.sin(np.arange(400) * 0.02) ** 2
+    slope = np.append(np.diff(target), 0.0) / dt
+    joint = ga.Cascade(ga.PI(kp=kd, ki=0.0), position=ga.P(kp / kd), velocity_feedforward=1.0)
+    rec = ga.Record(dt, position_command=target, velocity=np.zeros(400), position=np.zeros(400))
+    run = ga.run(ga.OneMass(J=0.02, D=0.05), rec, joint)
+    expected = kp * (target - run.position) + kd * (slope - run.velocity)
+    np.testing.assert_allclose(run.torque[:-1], expected[:-1], atol=1e-9 * np.abs(expected).max())
+    assert np.abs(run.velocity).max() > 0.1

@@ -61,7 +61,25 @@ def test_epos_studios_own_exports(data_dir: Path) -> None:
         columns = ga.columns(log).columns
         assert [c.unit for c in columns] == ["ms", "rpm", "%"] and columns[0].is_time
         period = next(line for line in log.read_text().splitlines() if line.startswith("Sampling period:;"))
-        assert columns[1].sample_time == pytest.approx(1e-3 * float(period.split(";")[1]))
+        assert columns[1].sample_time == pytest.approx(1e-3 * float(period.split(";")[1].rstrip(",")), rel=1e-14)
+
+
+@pytest.mark.parametrize("period", ["0.04", "40", "0.125", "12.8", "37.6"])
+def test_a_period_that_stamps_in_single_precision_were_rounded_from_is_the_exact_one(period: str, tmp_path: Path) -> None:
+    """ms; the stamps are printed with three decimals more than the period has, and cut off."""
+    stamps = np.nextafter(np.float32(float(period) * np.arange(500)), np.float32(0.0)).astype(float)
+    decimals = len(period.partition(".")[2]) + 3
+    cut = np.floor(stamps * 10**decimals) / 10**decimals
+    rows = (f"{t:.{decimals}f};{0.1 * k:.3f}" for k, t in enumerate(cut))
+    (tmp_path / "log.csv").write_text("Time [ms];w [rad/s]\n" + "\n".join(rows) + "\n")
+    assert ga.columns(tmp_path / "log.csv").columns[1].sample_time == pytest.approx(1e-3 * float(period), rel=1e-14)
+
+
+def test_a_period_of_many_digits_stays_the_mean(tmp_path: Path) -> None:
+    """1500 Hz: 0.666667 ms is no period of few digits."""
+    rows = (f"{k / 1.5:.6f};{0.1 * k:.3f}" for k in range(300))
+    (tmp_path / "log.csv").write_text("Time [ms];w [rad/s]\n" + "\n".join(rows) + "\n")
+    assert ga.columns(tmp_path / "log.csv").columns[1].sample_time == pytest.approx(1e-3 / 1.5, rel=1e-8)
 
 
 # Of ten signals that a trace may hold, four: three at 0.5 ms, written where they change, one at 1 ms, from the second record on.

@@ -17,7 +17,7 @@ from gaident.errors import ReadError
 from samples.logs import rows, write
 
 PI = math.pi
-DRIVE = Constants(counts_per_turn=10_000, torque_constant=0.5, rated_torque=2.0, torque_per_volt=0.25)
+DRIVE = Constants(counts_per_turn=10_000, torque_constant=0.5, rated_torque=2.0, torque_per_volt=0.25, reference_speed=300.0)
 
 KNOWN = [
     ("velocity", "rad/s", 1.0),
@@ -56,6 +56,10 @@ KNOWN = [
     ("torque", "A", 0.5),
     ("torque", "mA", 0.5e-3),
     ("torque", "V", 0.25),
+    ("velocity", "%", 3.0),
+    ("command", "‰", 0.3),
+    ("command", "4000 hex", 300.0 / 16384),
+    ("torque", "4000 hex", 2.0 / 16384),
     ("time", "s", 1.0),
     ("time", "ms", 1e-3),
     ("time", "us", 1e-6),
@@ -88,6 +92,8 @@ REFUSED: list[tuple[str, Any, list[str]]] = [
     ("torque", "MNm", ["'MNm' is no unit of torque"]),
     ("time", "h", ["'h' is no unit of time", "s, ms, us"]),
     ("torque", "%", ["rated_torque=..."]),
+    ("velocity", "%", ["reference_speed=..."]),
+    ("command", "4000 hex", ["reference_speed=..."]),
     ("torque", "A", ["torque_constant=...", "N m/A"]),
     ("torque", "V", ["torque_per_volt=...", "N m/V"]),
     ("position", "counts", ["counts_per_turn=..."]),
@@ -110,7 +116,7 @@ def test_refusals(quantity: str, unit: Any, words: list[str]) -> None:
         assert word in str(caught.value)
 
 
-@pytest.mark.parametrize("name", ["counts_per_turn", "torque_constant", "rated_torque", "torque_per_volt"])
+@pytest.mark.parametrize("name", ["counts_per_turn", "torque_constant", "rated_torque", "torque_per_volt", "reference_speed"])
 @pytest.mark.parametrize("value", [0, -1.0, math.nan, math.inf, "4096", True, 10**400])
 def test_constants_are_positive_numbers(name: str, value: Any) -> None:
     with pytest.raises(ReadError, match=f"{name}=.* positive finite number"):

@@ -19,6 +19,8 @@ _COUNTS = ("counts_per_turn", "[counts per turn, after edge evaluation]")
 _AMPERE = ("torque_constant", "[N m/A, or N/A]")
 _VOLT = ("torque_per_volt", "[N m/V, or N/V]")
 _RATED = ("rated_torque", "[N m, or N]")
+_REFERENCE = ("reference_speed", "[rad/s, or m/s]")
+_HEX = 1.0 / 0x4000  # no decision: a unit; drives count 100 % as 4000 hex
 
 
 @dataclass(frozen=True)
@@ -55,6 +57,9 @@ _VELOCITY: dict[tuple[str, ...], _Unit] = {
     ("mm/s", "mm/sec", "mm s-1"): _straight(1e-3),
     ("m/min",): _straight(1.0 / 60.0),
     ("mm/min",): _straight(1e-3 / 60.0),
+    ("%", "percent", "% of reference", "% of reference speed", "% of rated speed"): _Unit(0.01, _REFERENCE),
+    ("‰", "per mille", "0.1 %", "promille"): _Unit(1e-3, _REFERENCE),
+    ("4000 hex", "4000h", "0x4000"): _Unit(_HEX, _REFERENCE),
 }
 _POSITION: dict[tuple[str, ...], _Unit] = {
     ("rad", "radian", "radians"): _turning(1.0),
@@ -75,6 +80,7 @@ _TORQUE: dict[tuple[str, ...], _Unit] = {
     ("kN",): _straight(1e3),
     ("%", "percent", "% rated", "% of rated", "% of rated torque"): _Unit(0.01, _RATED),
     ("‰", "per mille", "0.1 %", "promille"): _Unit(1e-3, _RATED),
+    ("4000 hex", "4000h", "0x4000"): _Unit(_HEX, _RATED),
     ("A", "amp", "ampere", "arms", "aeff"): _Unit(1.0, _AMPERE),
     ("mA",): _Unit(1e-3, _AMPERE),
     ("V", "volt"): _Unit(1.0, _VOLT),
@@ -137,6 +143,7 @@ class Constants:
     inductance       of it [H]
     back_emf_constant  [V s/rad] (linear: [V s/m]); None: as the torque constant
     screw            [m] that a turn of the motor moves: lengths and forces are then those of the motor's angle and torque
+    reference_speed  what 100 % of a speed means [rad/s] (linear: [m/s])
     """
 
     counts_per_turn: float | None = None
@@ -147,6 +154,7 @@ class Constants:
     inductance: float | None = None
     back_emf_constant: float | None = None
     screw: float | None = None
+    reference_speed: float | None = None
 
     def check(self) -> None:
         """Raise ReadError unless each constant is None or a positive finite number."""
