@@ -32,6 +32,7 @@ from gaident.diagnosis.explain.wording import (
     evidence_of,
     far_off,
     hidden_by_torque_noise,
+    like_filters,
     of_the_mechanics,
     or_other_form,
     or_other_gains,
@@ -174,10 +175,9 @@ class Work:
 
     def other_form(self) -> UnloggedForm | None:
         """A form of controller that explains these records better than the given one and than other gains, or None."""
-        gains, margin = self.gain_doubt.better, self.found.space.margin
-        if self.form is None or not self.form.better(margin):
-            return None
-        return self.form if gains is None or self.form.score < gains.score - margin else None
+        form, gains, margin = self.form, self.gain_doubt.better, self.found.space.margin
+        better = form is not None and form.better(margin) and (gains is None or form.score < gains.score - margin)
+        return form if better else None
 
     def confirms(self, given: Work) -> bool:
         """Whether a search under another form of controller leaves noise, and fewer effects, less or a better mechanism."""
@@ -198,8 +198,7 @@ class Work:
         if better is None or first is None or first is self:
             return better
         same = first.found.space.whitens == self.found.space.whitens  # else the two are no BIC of the same errors
-        before = first.gain_doubt.better
-        worse = first.final.bic - better.bic if same or before is None else before.gain
+        worse = first.final.bic - better.bic if same or not first.gain_doubt.better else first.gain_doubt.better.gain
         return replace(better, gain=worse)
 
     def under_given(self) -> Selection | None:
@@ -289,7 +288,8 @@ class Work:
             self.notes.append(drives_itself(damping))
         real = [f for f in findings if not f.is_noise]
         answered = {*self.not_testable, *(name for f in findings for name in (f.effect, *f.alternatives))}
-        verdict = verdict_of(bool(real), driver is not None, self.data.slower and self.driving.in_doubt)
+        self.notes += (doubts := like_filters(self.data, in_series(self.final)))
+        verdict = verdict_of(bool(real), driver is not None, bool(doubts) or (self.data.slower and self.driving.in_doubt))
         if driver is not None and (dropped := [e for e in self.final.effects if e not in causes]):
             shown = driver if self.left.gains[driver] > self.left.needed else None
             self.notes.append(closest(dropped, shown, bool(real)))

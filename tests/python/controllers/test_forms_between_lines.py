@@ -77,7 +77,8 @@ def test_the_given_controller_is_no_finding() -> None:
 def test_a_limit_that_was_not_given_is_found_with_the_times() -> None:
     limited = ga.Cascade(replace(GIVEN, torque_limit=1.5, anti_windup="hold"), T)
     found = shown(record(levels(4, 14), 4, limited), 4)
-    assert found is not None and set(found.numbers) == {"torque_saturation"}
+    assert found is not None and set(found.numbers) == {"torque_saturation", "anti_windup"}
+    assert found.controller.velocity.anti_windup == "hold"
     assert found.numbers["torque_saturation"]["limit"][0] == pytest.approx(1.5, rel=1e-6)
 
 

@@ -121,11 +121,13 @@ def test_the_load_is_named(loop: str, every: int) -> None:
     assert dia.mechanics["inertia"].value == pytest.approx(1e-3, rel=0.01)
 
 
-@pytest.mark.parametrize(("loop", "form"), [("IP", "command_weight"), ("limit", "torque_saturation"), ("notch", "torque_filter")])
-def test_a_form_that_was_not_given_is_named_under_a_load(loop: str, form: str) -> None:
+@pytest.mark.parametrize(
+    ("loop", "form"), [("IP", ["command_weight"]), ("limit", ["torque_saturation", "anti_windup"]), ("notch", ["torque_filter"])]
+)
+def test_a_form_that_was_not_given_is_named_under_a_load(loop: str, form: list[str]) -> None:
     rec, _ = case(loop, 4)
     dia = ga.diagnose(rec, ga.Cascade(ga.PI(KP, KI), period=T))
-    assert [f.effect for f in dia.findings if not f.is_noise] == [form, "load_torque"], dia.summary()
+    assert [f.effect for f in dia.findings if not f.is_noise] == [*form, "load_torque"], dia.summary()
     assert dia.verdict == "explained" and dia.mechanics["inertia"].value == pytest.approx(1e-3, rel=0.01)
 
 

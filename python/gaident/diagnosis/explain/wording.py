@@ -26,6 +26,7 @@ __all__ = [
     "evidence_of",
     "far_off",
     "hidden_by_torque_noise",
+    "like_filters",
     "of_the_mechanics",
     "or_other_form",
     "or_other_gains",
@@ -151,6 +152,17 @@ def torque_unlogged(data: DataSet) -> list[Text]:
         "{inertia} and {torque} found here is wrong by that factor, and nothing shows it: log the {torque}."
     )
     return [say(text)]
+
+
+def like_filters(data: DataSet, series: Sequence[str]) -> list[Text]:
+    """Note on several effects in series, where no torque is logged: filters of a controller look like them."""
+    if len(series) < 2 or not torque_unlogged(data):  # no decision: a current loop alone is usual
+        return []
+    text = (
+        "No {torque} is logged, and the model needs {} in series. Filters of the controller, or a command weight, look like that "
+        "and change {inertia} and friction: neither is proven. Log the {torque}, which shows what the controller does."
+    )
+    return [say(text, joined(" and ", [called(name) for name in series]))]
 
 
 def period_seen(data: DataSet) -> list[Text]:
