@@ -25,6 +25,7 @@ from gaident.control.pi import PI
 from gaident.control.pi_torque import pi_torque
 from gaident.data.record import Record
 from gaident.errors import RecordError
+from gaident.models.held_torque import held_mean
 from gaident.models.model import Model
 from gaident.models.simulate import Run, run
 from gaident.policy.table import POLICY
@@ -78,7 +79,7 @@ def measured_response(rec: Record, controller: PI | None = None) -> FrequencyRes
                 "much as the drive; use a record whose command changes after its start"
             )
         )
-    torque = rec.torque
+    torque = held_mean(rec).torque
     if torque is None:
         if controller is None or rec.command is None:
             raise RecordError(f"the record has no torque, and no controller to make it from: give {TORQUE} or PI(...)")

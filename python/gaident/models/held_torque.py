@@ -12,7 +12,7 @@ from gaident.data.record import Record
 from gaident.data.torque_kind import COMMANDED, MEAN, MEASURED, SAMPLE
 from gaident.policy.table import POLICY
 
-__all__ = ["held_mean", "held_torque", "kind_of_held", "sampled_between"]
+__all__ = ["held_mean", "held_torque", "kind_of_held", "sampled_between", "torque_at_lines"]
 
 Signal = NDArray[np.float64]
 
@@ -40,6 +40,13 @@ def held_torque(rec: Record) -> Signal:
     if rec.torque_log == MEAN:
         return np.append(u[1:], u[-1])
     return np.append(0.5 * (u[1:] + u[:-1]), u[-1]) if sampled_between(rec) else u  # no decision: a formula: a mean of two
+
+
+def torque_at_lines(rec: Record) -> Signal:
+    """The logged torque at each line [N m] (n,); of a log of means, which are half a line old, the mean of two neighbours."""
+    assert rec.torque is not None
+    u = rec.torque
+    return np.append(0.5 * (u[1:] + u[:-1]), u[-1]) if rec.torque_log == MEAN else u  # no decision: a formula: a mean of two
 
 
 def held_mean(rec: Record) -> Record:

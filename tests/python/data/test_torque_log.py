@@ -170,3 +170,18 @@ def test_friction_and_a_torque_filter_are_named_of_means() -> None:
     found = {f.effect: f.parameters for f in dia.causes}
     assert found["torque_filter"]["time_constant"].value == pytest.approx(0.5e-3, rel=0.01)
     assert found["coulomb_friction"]["torque"].value == pytest.approx(0.05, rel=0.02)
+
+
+def test_a_regression_reads_a_mean_at_its_place() -> None:
+    """A smooth torque with 40 samples to a line: its means are half a line old, which changes a damping by tau J w^2."""
+    fine, every, J, D = 5e-5, 40, 0.01, 0.05
+    t = fine * np.arange(200 * 400)
+    speed = 20.0 * np.sin(2 * np.pi * 1.3 * t) + 8.0 * np.sin(2 * np.pi * 4.1 * t)
+    torque = J * np.gradient(speed, fine) + D * speed
+    means = np.concatenate([np.zeros(every - 1), torque])[: len(t)].reshape(-1, every).mean(axis=1)
+    rec = ga.Record(fine * every, velocity=speed[::every], torque=means, torque_log="mean")
+    found, late = (
+        ga.inverse_dynamics(r, terms=("inertia", "viscous")).parameters for r in (rec, rec.with_channels(torque_log="sample"))
+    )
+    assert found["inertia"].value == pytest.approx(J, rel=1e-3)
+    assert abs(found["viscous"].value - D) < 0.005 * D < 0.02 * D < abs(late["viscous"].value - D)
