@@ -20,9 +20,11 @@ from numpy.typing import ArrayLike, NDArray
 
 from gaident.checks import real_number
 from gaident.data.record import CHANNELS, Record
+from gaident.data.record_checks import at_its_lines
 from gaident.data.signals.arrays import MINIMUM_SAMPLES, channel, positive_number, sample_time
 from gaident.data.signals.decimation import low_passed
 from gaident.data.signals.lags import LagFit, coarse_lags, refine
+from gaident.data.torque_kind import MEAN, SAMPLE
 from gaident.errors import RecordError
 from gaident.estimation.criterion import gained
 from gaident.policy.table import POLICY
@@ -284,6 +286,8 @@ def _result(
     missing = next((name for name in taken if name not in theirs), None)
     if missing is not None:
         raise RecordError(f"take: other has no {missing!r}; it has {', '.join(theirs)}")
+    if "torque" in taken and isinstance(other, Record) and other.torque_log == MEAN:
+        theirs = theirs | {"torque": at_its_lines(theirs["torque"])}
     inner = (rec.time - fit.offset) / (1.0 + fit.rate)
     end = (len(next(iter(theirs.values()))) - 1) * their_dt
     common = np.flatnonzero((inner >= 0.0) & (inner <= end))
@@ -294,8 +298,8 @@ def _result(
     ratio = rec.dt / (their_dt * (1.0 + fit.rate))
     new = {name: PchipInterpolator(axis, low_passed(theirs[name], ratio))(inner[start:stop]) for name in taken}
     channels: Mapping[str, Any] = {name: values[start:stop] for name, values in mine.items()} | new
-    about = (other.torque_is, other.torque_log) if "torque" in taken and isinstance(other, Record) else (None, None)
-    record = rec.with_channels(torque_is=about[0], torque_log=about[1], **channels)
+    kind = other.torque_is if "torque" in taken and isinstance(other, Record) else None
+    record = rec.with_channels(torque_is=kind, torque_log=SAMPLE if "torque" in taken else None, **channels)
     far = max(abs(inner[start] - fit.centre), abs(inner[stop - 1] - fit.centre))
     uncertainty = 2.0 * float(np.hypot(fit.centre_std, far * fit.std[1]))
     return Alignment(record, fit.offset, fit.std[0], fit.rate, fit.std[1], seen, fit.gain, fit.correlation, uncertainty)

@@ -80,7 +80,7 @@ def assemble(table: LogTable, wanted: Wanted, stem: str) -> Record:
         name = stem if wanted.name is None else wanted.name
         notes = (*counters.notes(), *said)
         channels: dict[str, Any] = {channel: values.get(channel) for channel in CHANNELS}
-        rec = Record(dt, name=name, torque_is=kind, torque_log=_line_of(table, wanted, values), notes=notes, **channels)
+        rec = Record(dt, name=name, torque_is=kind, torque_log=_line_of(table, wanted, values, named), notes=notes, **channels)
         return rec.shifted(**wanted.shift) if wanted.shift else rec
     except RecordError as error:
         raise RecordError(f"{table.path}: {error.marked}") from None
@@ -105,10 +105,10 @@ def _torque_kind(table: LogTable, wanted: Wanted, column: Column | None) -> str:
     return wanted.torque_is
 
 
-def _line_of(table: LogTable, wanted: Wanted, values: Mapping[str, NDArray[np.float64]]) -> str:
-    """What a line contains of the torque that is read; one that was decimated or resampled with the log is a sample.
+def _line_of(table: LogTable, wanted: Wanted, values: Mapping[str, NDArray[np.float64]], named: Mapping[str, Column]) -> str:
+    """What a line contains of the torque that is read.
 
-    Raises ReadError where there is none.
+    Raises ReadError for a mean where there is none, or where what is read is none.
     """
     if wanted.torque_log == MEAN and "torque" not in values:
         raise ReadError(
@@ -117,8 +117,13 @@ def _line_of(table: LogTable, wanted: Wanted, values: Mapping[str, NDArray[np.fl
         )
     if wanted.torque_log == MEAN and (wanted.decimate > 1 or wanted.resample is not None):
         raise ReadError(
-            f"{table.path}: a mean is one over the lines of the log itself: read it without decimate and resample, then use "
-            "rec.decimate"
+            f"{table.path}: {arg('torque_log', repr(MEAN))} cannot be read with decimate or resample, which leave no means: "
+            "leave these out (in Python, decimate the record afterwards)"
+        )
+    if wanted.torque_log == MEAN and "voltage" in named:
+        raise ReadError(
+            f"{table.path}: {arg('torque_log', repr(MEAN))} speaks of a logged torque, and this one is worked out of a voltage: "
+            "leave torque_log out"
         )
     return wanted.torque_log
 

@@ -284,7 +284,7 @@ class Record:
         """
         factor = factor_of(factor, "decimate", "({!r})")
         kept: Mapping[str, Any] = decimated_channels(dict(self.channels()), factor, self.torque_log)
-        return self.with_channels(dt=self.dt * factor, torque_log=SAMPLE, **kept)
+        return self.with_channels(dt=self.dt * factor, torque_log=self.torque_log if factor == 1 else SAMPLE, **kept)
 
     def shifted(self, **samples: int) -> Record:
         """Return the record with channels moved against the others, for a log that wrote them on another line.
@@ -346,7 +346,7 @@ class Record:
         return part
 
     def to_dict(self) -> dict[str, Any]:
-        """Return plain data for JSON: dt, name, torque_is, and the channels as lists, None for those that are not there."""
+        """Return plain data for JSON: what was given, the channels as lists, None for those that are not there."""
         channels = {key: None if (v := getattr(self, key)) is None else v.tolist() for key in CHANNELS}
         about = {"dt": self.dt, **self._about, "notes": list(self.notes)}
         return {"schema": SCHEMA, "schema_version": SCHEMA_VERSION, **about, **channels}

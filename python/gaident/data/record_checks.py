@@ -21,6 +21,7 @@ from gaident.data.torque_kind import COMMANDED, MEAN, SAMPLE, TORQUE_KINDS, TORQ
 from gaident.errors import RecordError
 
 __all__ = [
+    "at_its_lines",
     "check_bounds",
     "complete",
     "decimated_channels",
@@ -192,18 +193,17 @@ def still_driven(channels: Mapping[str, object], changed: Mapping[str, object]) 
 def decimated_channels(
     channels: Mapping[str, NDArray[np.float64]], factor: int, torque_log: str
 ) -> dict[str, NDArray[np.float64]]:
-    """Every `factor`-th sample behind a low-pass, see `Record.decimate`. Raises RecordError where too few are left.
-
-    A torque that is a mean since the line before is half a line old; the mean of two neighbours is that at the line.
-    """
+    """Every `factor`-th sample behind a low-pass, see `Record.decimate`. Raises RecordError where too few are left."""
     count = -(-len(channels["velocity"]) // factor)
     if count < MINIMUM_SAMPLES:
         raise RecordError(f"decimate({factor}) leaves {count} samples, but at least {MINIMUM_SAMPLES} are needed")
-    made = dict(channels)
-    if torque_log == MEAN:
-        u = channels["torque"]
-        made["torque"] = np.append(0.5 * (u[1:] + u[:-1]), u[-1])  # no decision: a formula: a mean of two
-    return {key: decimated(values, factor) for key, values in made.items()}
+    late = {"torque": at_its_lines(channels["torque"])} if torque_log == MEAN and factor > 1 else {}
+    return {key: decimated(values, factor) for key, values in (dict(channels) | late).items()}
+
+
+def at_its_lines(means: NDArray[np.float64]) -> NDArray[np.float64]:
+    """A signal at the lines (n,), of its means since the line before, which are half a line old: the mean of two neighbours."""
+    return np.append(0.5 * (means[1:] + means[:-1]), means[-1])  # no decision: a formula: a mean of two
 
 
 def saved_fields(data: Mapping[str, Any], channels: Sequence[str]) -> dict[str, Any]:

@@ -32,6 +32,7 @@ from gaident.errors import SettingsError
 from gaident.identification.identify import identify
 from gaident.identification.replay.command_timing import timed
 from gaident.identification.replay.driven_records import torque_driven
+from gaident.models.drive_torque import on_lines
 from gaident.policy.table import POLICY
 from gaident.results.diagnosis import Diagnosis
 from gaident.results.finding import Finding
@@ -138,7 +139,8 @@ def diagnose(
         given = timed(given, asked.controller)
         driven = torque_driven(given, asked.controller)
         kept = timed(outliers_of_the_log(apart, asked.controller)[0], asked.controller)
-    records, validating = driven.records, torque_driven(kept, asked.controller).records if kept else ()
+    records = tuple(on_lines(r, driven.controller) for r in driven.records)
+    validating = tuple(on_lines(r, asked.controller) for r in torque_driven(kept, asked.controller).records) if kept else ()
     checked(records, validating, driven.loop, identification, bootstrap, seed, progress, axis, pitch)
     origin = {r.digest: whole for r, whole in zip((*records, *validating), (*given, *kept), strict=True)}
     records, validating = in_order(records), in_order(validating)

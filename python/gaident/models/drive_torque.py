@@ -16,6 +16,7 @@ from gaident.data.record import Record
 from gaident.data.signals.difference import is_backward_difference
 from gaident.data.torque_kind import MEAN, SAMPLE
 from gaident.errors import RecordError
+from gaident.models.held_torque import held_mean
 from gaident.models.made_torque import late, made_at_its_clock, stored_torque
 from gaident.models.starts import starts_moving
 
@@ -24,6 +25,7 @@ __all__ = [
     "as_old_as_its_velocity",
     "driven_by",
     "made_by",
+    "on_lines",
     "straight_driven",
     "torque_blocks",
     "torque_of",
@@ -55,6 +57,16 @@ def driven_by(rec: Record, controller: Controller) -> Record:
         at_clock = _at_its_clock(rec, torque, controller, stored).reshape(len(rec), every)
         torque = _mean_ahead(torque, at_clock) if rec.torque_log == MEAN else at_clock.mean(axis=1)
     return rec.with_channels(torque=late(torque, controller.delay / rec.dt, before), torque_log=SAMPLE)
+
+
+def on_lines(rec: Record, controller: Controller | None) -> Record:
+    """The record with the torque of a log of means as a diagnosis takes it.
+
+    Without a controller it is held over each line. Under one at the log's rate a mean over one sample is that sample.
+    """
+    if controller is None:
+        return held_mean(rec)
+    return rec.with_channels(torque_log=SAMPLE) if controller.one_equation and rec.torque_log == MEAN else rec
 
 
 def straight_driven(rec: Record, controller: Controller) -> Record:

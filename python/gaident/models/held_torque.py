@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gaident.data.record import Record
+from gaident.data.record_checks import at_its_lines
 from gaident.data.torque_kind import COMMANDED, MEAN, MEASURED, SAMPLE
 from gaident.policy.table import POLICY
 
@@ -43,10 +44,9 @@ def held_torque(rec: Record) -> Signal:
 
 
 def torque_at_lines(rec: Record) -> Signal:
-    """The logged torque at each line [N m] (n,); of a log of means, which are half a line old, the mean of two neighbours."""
+    """The logged torque at each line [N m] (n,), also of a log of means, see `at_its_lines`."""
     assert rec.torque is not None
-    u = rec.torque
-    return np.append(0.5 * (u[1:] + u[:-1]), u[-1]) if rec.torque_log == MEAN else u  # no decision: a formula: a mean of two
+    return at_its_lines(rec.torque) if rec.torque_log == MEAN else rec.torque
 
 
 def held_mean(rec: Record) -> Record:

@@ -19,7 +19,7 @@ from gaident.diagnosis.held_parts import VALIDATION, held_out_from
 from gaident.diagnosis.records.hygiene import cleaned, outliers
 from gaident.errors import GaidentError
 from gaident.estimation.dataset import DataSet
-from gaident.models.drive_torque import torque_of
+from gaident.models.drive_torque import on_lines, torque_of
 from gaident.models.model import Model
 from gaident.models.simulate import run
 from gaident.policy.table import POLICY
@@ -59,6 +59,7 @@ def run_of(result: Diagnosis | Identification, rec: Record) -> RecordView:
             extended = free_run(result.model, "extended")
     else:
         before = _finite(result.simulate(rec), rec, "linear", notes)
+    rec = on_lines(rec, result.controller)
     simulated = rec.torque is None and result.controller is not None and loop is None
     torque = run(linear, rec, result.controller).torque if simulated else torque_of(rec, loop)
     dhat, std = None, 0.0

@@ -11,7 +11,7 @@ from gaident.control.cascade import controller_of
 from gaident.control.controller import Controller
 from gaident.data.record import Record
 from gaident.errors import check_schema
-from gaident.models.drive_torque import driven_by
+from gaident.models.drive_torque import driven_by, on_lines
 from gaident.models.model import Model
 from gaident.providers import picture, provided
 from gaident.results.estimate import Estimate
@@ -187,8 +187,7 @@ class Diagnosis(SavedResult):
         """Return a record as the diagnosis used it.
 
         That is without the shifts of its log, see `log_shifts`.
-        Under a controller that is no bare PI its torque is then the one that drove the motor over each line, see
-        docs/controllers.md.
+        Without a bare PI its torque is then the one that drove the motor over each line, see docs/controllers.md.
 
         Parameters
         ----------
@@ -205,6 +204,7 @@ class Diagnosis(SavedResult):
         RecordError
             Where no torque is logged and this controller makes none of what is.
         """
+        rec = on_lines(rec, self.controller)
         rec = rec.shifted(**moves) if (moves := self.log_shifts.get(rec.digest)) else rec
         return rec if self.controller is None or self.controller.one_equation else driven_by(rec, self.controller)
 

@@ -15,6 +15,7 @@ import gaident as ga
 from drive_rig import Noise, Plant, between_lines, disturbances, run_drive, skip_without_library
 from gaident.cli.main import main
 from gaident.control.between import at_lines
+from gaident.diagnosis.controller.form_regression import law_of
 from gaident.errors import ReadError, RecordError
 from gaident.models.drive_torque import driven_by
 from gaident.models.held_torque import held_torque
@@ -81,7 +82,7 @@ def test_a_file_says_it(tmp_path: Path, capsys: pytest.CaptureFixture[str], monk
     assert ga.read("log.csv", torque_log="mean").torque_log == "mean" and ga.read("log.csv").torque_log == "sample"
     with pytest.raises(ReadError, match="torque_log"):
         ga.read("log.csv", torque_log="now")
-    with pytest.raises(ReadError, match="without decimate and resample"):
+    with pytest.raises(ReadError, match="cannot be read with decimate or resample"):
         ga.read("log.csv", torque_log="mean", decimate=2)
     with pytest.raises(ReadError, match="no such column is read"):
         ga.read("log.csv", columns={"command": 1, "velocity": 2, "torque": None}, torque_log="mean")
@@ -185,3 +186,41 @@ def test_a_regression_reads_a_mean_at_its_place() -> None:
     )
     assert found["inertia"].value == pytest.approx(J, rel=1e-3)
     assert abs(found["viscous"].value - D) < 0.005 * D < 0.02 * D < abs(late["viscous"].value - D)
+
+
+def test_records_of_means_do_not_mix_at_their_ends() -> None:
+    """The first line of each record has none of the record before it; records of means and of samples may stand together."""
+    rec, _ = logged(ga.Cascade(PI, period=PERIOD), 8)
+    samples, _ = logged(ga.Cascade(PI, period=PERIOD), 8, mean=False)
+    for records in ([rec, rec[:900]], [rec, samples]):
+        found = law_of(records, PI, 8)
+        assert found is not None
+        law, floor = found
+        gains = np.array([PI.kp, PI.kp, PI.ki, 0.0, 0.0, *np.zeros(len(records))])
+        left = law.logged - law.columns((), np.zeros(0)) @ gains
+        assert np.sqrt(np.mean(left**2)) < 4.0 * max(floor, 0.03 * PI.kp)
+
+
+def test_a_force_error_compares_a_mean_with_a_mean() -> None:
+    torque = np.repeat([0.0, 1.0, -0.5, 0.3, 0.0], 200)
+    true = ga.OneMass(J=0.01, D=0.05).model()
+    speed = ga.simulate(true, ga.Record(1e-3, torque=torque, velocity=np.zeros(1000)))
+    rec = ga.Record(1e-3, torque=np.append(0.0, torque[:-1]), velocity=speed, torque_log="mean")
+    good, late = (ga.force_error(true, r).percent for r in (rec, rec.with_channels(torque_log="sample")))
+    assert good < 0.1 and late > 1.0
+
+
+def test_an_identification_knows_its_records_of_means() -> None:
+    rec = some(torque_is="measured")
+    assert ga.identify(rec, seed=1).digests == (rec.digest,)
+
+
+def test_a_mean_from_another_log_is_put_at_its_lines() -> None:
+    n = np.arange(4000)
+    sine = np.sin(2 * np.pi * n / 800)
+    other = ga.Record(1e-3, velocity=sine, torque=np.sin(2 * np.pi * (n - 0.5) / 800), torque_log="mean")
+    rec = ga.Record(4e-3, command=sine[::4], velocity=sine[::4])
+    joined = ga.align(rec, other, take=["torque"], within=(-0.01, 0.01)).record
+    assert joined.torque is not None and joined.torque_log == "sample"
+    assert np.abs(joined.torque - joined.velocity)[30:-30].max() < 2e-3, "half a line of the other log would make 4e-3"
+    assert rec.decimate(1).torque_log == "sample" and other.decimate(1) == other

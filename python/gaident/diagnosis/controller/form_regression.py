@@ -81,7 +81,7 @@ class Law:
     velocities: others that have the same lines [rad/s] (n r,) each; () where the log has all samples.
     straight: the velocity straight between its lines [rad/s] (n r,).
     steps: that the velocities of each record are rounded to [rad/s], where r = 1.
-    mean: whether the torque is of means since the line before.
+    mean: of each record, whether its torque is of means since the line before; () where none is.
     lost: where the lines do not tell when the command jumped: steps of the signals are fitted, see `lost_times`.
     """
 
@@ -98,7 +98,7 @@ class Law:
     straight: Vector | None = None
     steps: tuple[float, ...] = ()
     lost: LostTimes | None = None
-    mean: bool = False
+    mean: tuple[bool, ...] = ()
 
     @property
     def others(self) -> tuple[Law, ...]:
@@ -126,7 +126,9 @@ class Law:
         for b, a in torque:
             rows = filtered(b, a, rows, ticks)
         starts = np.repeat(np.eye(len(self.lengths)), self.lengths, axis=1)
-        return self._fitted(np.concatenate([at_lines(rows, self.every, self.mean), starts]))
+        parts = zip(np.split(rows, np.cumsum(ticks)[:-1], axis=1), self.mean or (False,) * len(ticks), strict=True)
+        lines = np.concatenate([at_lines(part, self.every, mean) for part, mean in parts], axis=1)
+        return self._fitted(np.concatenate([lines, starts]))
 
     @property
     def logged(self) -> Vector:
@@ -206,7 +208,18 @@ def law_of(records: Sequence[Record], given: PI, every: int = 1, steps: tuple[fl
         smooth = np.concatenate([log.velocity for log in logs])
         straight = np.concatenate([at_the_clock(log.velocity[::every], every) for log in logs])
         used = stretch >= 0
-        law = Law(command, smooth, torque, used, lengths, period, every, stretch, straight=straight, mean=logs[0].mean)
+        law = Law(
+            command,
+            smooth,
+            torque,
+            used,
+            lengths,
+            period,
+            every,
+            stretch,
+            straight=straight,
+            mean=tuple(log.mean for log in logs),
+        )
         coefficients = np.array([given.kp, given.kp, given.ki, *np.zeros(2 + len(records))])
         off, own = law.of_other(replace(law, velocity=straight), coefficients)
         law = replace(law, rho=correlation_of(off, own))

@@ -28,7 +28,7 @@ from gaident.control.filtering import filtered
 from gaident.control.pi import PI
 from gaident.control.pi_torque import pi_torque
 from gaident.data.record import Record
-from gaident.data.torque_kind import COMMANDED, MEASURED
+from gaident.data.torque_kind import COMMANDED, MEASURED, SAMPLE
 from gaident.estimation.criterion import bic
 from gaident.identification.replay.causes import white_noise
 from gaident.identification.replay.replay import replay
@@ -95,7 +95,8 @@ def lag_shown(records: Sequence[Record], controller: PI | None) -> Lag | None:
 def commanded(rec: Record, controller: PI) -> Record:
     """The record with the torque that the controller makes of command and velocity, from what it stored before."""
     start = 0.0 if rec.torque is None else _stored_before(rec, controller)
-    return rec.with_channels(torque_is=COMMANDED, torque=pi_torque(_command(rec), rec.velocity, rec.dt, controller, start))
+    torque = pi_torque(_command(rec), rec.velocity, rec.dt, controller, start)
+    return rec.with_channels(torque_is=COMMANDED, torque_log=SAMPLE, torque=torque)
 
 
 @dataclass(frozen=True, eq=False)

@@ -6,7 +6,7 @@ Findings are what differs from the given controller.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 from gaident.axis import Text, joined, say
@@ -44,8 +44,10 @@ def other_form(records: Sequence[Record], validation: Sequence[Record], given: C
     found = bare if shown is None else replace(shown.controller, delay=cascade.delay)
     if not_followed(records, found):
         return None
+    whole = shown
     if shown is not None:
-        shown = replace(shown, numbers={name: x for name, x in shown.numbers.items() if _differs(name, found, cascade)})
+        differs = {name: x for name, x in shown.numbers.items() if _differs(name, found, cascade, x)}
+        shown = replace(shown, numbers=differs)
     findings = () if shown is None else findings_of(shown)
     words = (
         "The logged {torque} does not follow from the given controller, but from one with the same gains{}{}: this one is used."
@@ -53,21 +55,24 @@ def other_form(records: Sequence[Record], validation: Sequence[Record], given: C
     absent = _left_out(found, cascade)
     without = say(" without its {}", joined(", ", [Text(name) for name in absent])) if absent else ""
     beside = say("{} with {}", " and" if absent else "", parts_of(shown)) if shown is not None and shown.numbers else ""
-    notes = (say(words, without, beside), *(() if shown is None else notes_of(shown, records)[1:]))
+    notes = (say(words, without, beside), *(() if whole is None else notes_of(whole, records)[1:]))
     driven, later = (tuple(driven_by(r, found) for r in part) for part in (records, validation))
     numbers = None if shown is None else shown.found.then(lambda one: replace(cascade_of(one), delay=cascade.delay))
     return Driver(driven, later, found, findings, notes, {}, numbers)
 
 
-def _differs(name: str, found: Cascade, given: Cascade) -> bool:
-    """Whether a part of the found controller is not that of the given one."""
+def _differs(name: str, found: Cascade, given: Cascade, numbers: Mapping[str, tuple[float, float]]) -> bool:
+    """Whether a part of the found controller is not that of the given one; numbers: it, with their deviations."""
     here, there = found.velocity, given.velocity
     if name == "integration_rule":
         return here.rule != there.rule
     if name == "command_weight":
         return not _same(here.command_weight, there.command_weight)
     if name == ANTI_WINDUP:
-        return here.anti_windup != there.anti_windup or not _same(here.tracking_time or 0.0, there.tracking_time or 0.0)
+        time, std = numbers.get("tracking_time", (0.0, 0.0))
+        given_time = there.tracking_time or 0.0
+        same = _same(time, given_time) or abs(time - given_time) <= POLICY.check_deviations * std
+        return here.anti_windup != there.anti_windup or not same
     if name == OF_SETTING["torque_limit"]:
         return not _same(here.limits[0], there.limits[0])
     place = next((place for place, finding in FILTER_NAMES.items() if finding == name), "")

@@ -89,8 +89,9 @@ def limited(records: Sequence[Record], controller: Cascade) -> Limited:
     if given is not None:
         best = _closest(records, controller, given)
         gain = _by_windup(records, controller, best)
-        found = Limited(best, None, gain, windup=gain, time_std=_time_std(records, best))
-        return found if gain > 0.0 else Limited(controller, None, 0.0)
+        if not gain > 0.0:
+            return Limited(controller, None, 0.0)
+        return Limited(best, None, gain, windup=gain, time_std=_time_std(records, best))
     if all(comparable(r, controller) for r in records) and not not_followed(records, controller):
         return Limited(controller, None, 0.0)
     parts = [np.abs(before_filters(r.torque, controller, r.dt)) for r in records if r.torque is not None]
@@ -103,7 +104,7 @@ def limited(records: Sequence[Record], controller: Cascade) -> Limited:
     best = _closest(records, controller, limit)
     same = replace(controller, velocity=replace(controller.velocity, torque_limit=limit))
     windup, gain = _by_windup(records, same, best), _gain(records, controller, best)
-    return Limited(best, limit, gain, _spread(records, limit), windup, _time_std(records, best))
+    return Limited(best, limit, gain, _spread(records, limit), windup, _time_std(records, best) if windup > 0.0 else 0.0)
 
 
 def _by_windup(records: Sequence[Record], given: Cascade, best: Cascade) -> float:

@@ -29,9 +29,10 @@ from numpy.typing import NDArray
 from gaident.checks import real_number
 from gaident.control.pi import PI
 from gaident.data.record import Record
-from gaident.data.torque_kind import MEASURED
+from gaident.data.torque_kind import MEAN, MEASURED
 from gaident.errors import ModelError, RecordError, SettingsError
 from gaident.estimation.regression.motion import ORDER, Motion, cutoff_of, low_passed, motion_of, noise_share, torque_noise
+from gaident.models.held_torque import held_torque
 from gaident.models.model import Model
 from gaident.models.simulate import run, simulate
 from gaident.policy.table import POLICY
@@ -235,11 +236,12 @@ def effects_before_the_shaft(model: Model) -> list[str]:
 def _at_shaft(model: Model, rec: Record) -> Vector:
     """The logged torque behind the actuator [N m], its mean over each sample: an inertia of 1 makes it a velocity's change."""
     assert rec.torque is not None
+    logged = held_torque(rec) if rec.torque_log == MEAN else rec.torque
     ahead = effects_before_the_shaft(model)
     if not ahead:
-        return rec.torque
+        return logged
     unit = Model(1.0, [0.0], effects=[e for e in model.effects if e.name in ahead])
-    torque = np.append(rec.torque, rec.torque[-1])
+    torque = np.append(logged, logged[-1])
     padded = Record(rec.dt, torque=torque, velocity=np.zeros(len(torque)))
     return np.asarray(np.diff(simulate(unit, padded)) / rec.dt)
 
@@ -247,8 +249,8 @@ def _at_shaft(model: Model, rec: Record) -> Vector:
 def _led(model: Model, rec: Record, motion: Motion, cutoff_hz: float) -> Vector:
     """The torque of a stiff loop that leads the model's mechanism along a filtered motion [N m] (n,).
 
-    A commanded torque is held over each sample, so its mean over the sample is given; beside a measured torque the value at the
-    sample.
+    A commanded torque is held over each sample, so its mean over the sample is given, as beside a log of means; beside another
+    measured torque the value at the sample.
     """
     from scipy.interpolate import CubicSpline
 
@@ -277,7 +279,8 @@ def _led(model: Model, rec: Record, motion: Motion, cutoff_hz: float) -> Vector:
             led = run(mechanism, Record(dt, command=command, velocity=command, position=position), loop, state)
             command = command + np.where(np.isfinite(led.velocity), wanted - led.velocity, 0.0)
     held = led.torque.reshape(n, fine)
-    return np.asarray(held[:, 0] if rec.torque_is == MEASURED else held.mean(axis=1))
+    sampled = rec.torque_is == MEASURED and rec.torque_log != MEAN
+    return np.asarray(held[:, 0] if sampled else held.mean(axis=1))
 
 
 def _noise_power(model: Model | InverseDynamics | TorqueOf, rec: Record, motion: Motion, cutoff_hz: float, order: int) -> float:

@@ -12,9 +12,8 @@ from gaident.control.beside import beside_pi
 from gaident.control.controller import Controller
 from gaident.control.pi import PI, bare_pi
 from gaident.data.record import Record
-from gaident.data.torque_kind import MEAN, SAMPLE
+from gaident.data.torque_kind import MEAN
 from gaident.models.drive_torque import driven_by
-from gaident.models.held_torque import held_mean
 from gaident.models.made_torque import stored_torque
 from gaident.policy.table import POLICY
 
@@ -48,10 +47,10 @@ class Driven(NamedTuple):
 def torque_driven(records: Sequence[Record], controller: Controller | None) -> Driven:
     """The records as they are under a bare PI or in the open loop; under any other controller as driven by their torque."""
     if controller is None:
-        return Driven(tuple(held_mean(r) for r in records), None)
+        return Driven(tuple(records), None)
+    means = (MEAN_OF_ONE,) * any(r.torque_log == MEAN and controller.log_every(r.dt) == 1 for r in records)
     if controller.one_equation:
-        means = any(r.torque_log == MEAN for r in records)
-        return Driven(tuple(r.with_channels(torque_log=SAMPLE) for r in records), controller, (MEAN_OF_ONE,) * means)
+        return Driven(tuple(records), controller, means)
     every = max(controller.log_every(r.dt) for r in records)
     if every == 1:
         has = beside_pi(controller)
@@ -73,7 +72,7 @@ def torque_driven(records: Sequence[Record], controller: Controller | None) -> D
         size = float(np.sqrt(np.mean(rec.torque**2)))
         if off > POLICY.negligible * size:
             doubts.append(follows_not(rec.name if len(records) > 1 else "", off, size))
-    return Driven(tuple(driven_by(r, controller) for r in records), controller, (note,), tuple(doubts), every > 1)
+    return Driven(tuple(driven_by(r, controller) for r in records), controller, (note, *means), tuple(doubts), every > 1)
 
 
 def follows_not(name: str, off: float, size: float) -> Text:
