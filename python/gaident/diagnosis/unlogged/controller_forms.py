@@ -147,5 +147,5 @@ VARIANTS: tuple[ControllerForm, ...] = (
 )
 """Forms that a drive's controller often has, and other gains, which come first where they explain as much.
 
-A rule of integration moves kp by less than a thousandth at a drive's clock.
+A rule of integration is none of them: it moves kp by ki T/2 and comes out as other gains.
 """
