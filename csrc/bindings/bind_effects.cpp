@@ -8,6 +8,7 @@ namespace {
 const char* name_of(Place place) {
     switch (place) {
         case Place::shaft: return "shaft";
+        case Place::mechanism: return "mechanism";
         case Place::coupling: return "coupling";
         case Place::actuator: return "actuator";
         case Place::controller: return "controller";
@@ -48,11 +49,14 @@ std::string broken_relation(const std::string& name, const std::vector<double>& 
 void check_structure(Structure s, EffectSet effects) {
     if (effects.bits == 0) return;
     if (s.p < 1) throw std::invalid_argument("poles: a model with effects needs more poles than zeros");
+    const auto stands_at = [&](Place place) { return effects.any([=](const EffectInfo& info) { return info.place == place; }); };
+    if (s == Structure{1, 2} && stands_at(Place::plant) && stands_at(Place::mechanism))
+        throw std::invalid_argument("effects: what changes the mechanism linearly does not go together with a changing inertia");
     if (!effects.needs_two_masses()) return;
     for (const EffectInfo& info : effect_table)
         if (info.needs_two_masses && effects.has(effect_named(info.name)) && !(s == Structure{1, 2}))
             throw std::invalid_argument(std::string("effects: ") + info.name + " needs two masses, p = 1 and q = 2");
-    if (effects.any([](const EffectInfo& info) { return info.place == Place::plant; }))
+    if (stands_at(Place::plant))
         throw std::invalid_argument(
             "effects: what changes the mechanism linearly does not go together with a nonlinear coupling");
 }

@@ -26,7 +26,7 @@ py::dict effect_numbers(const PreparedEffects& made, EffectSet effects) {
     AllEffects::each([&]<class E>() {
         if (!effects.has<E>()) return;
         const auto& c = made.constants.of<E>();
-        double flat[sizeof c / sizeof(double) + 1];
+        double flat[sizeof c / sizeof(double) + 1] = {};
         std::memcpy(flat, &c, HasCoefficients<E> ? sizeof c : 0);
         d[E::info.name] = numbers(flat, HasCoefficients<E> ? static_cast<int>(sizeof c / sizeof(double)) : 0);
     });

@@ -146,6 +146,13 @@ PICTURES: dict[str, Picture] = {
     "position_friction": Picture(
         {"torque": 0.06, "amplitude": 0.7, "order": 1.0, "phase": 0.0}, AGAINST_ANGLE, shaft_of_angle, swing(18.0, 0.8)
     ),
+    "torque_hum": Picture(
+        {"amplitude": 0.05, "frequency": 25.0, "phase": 0.0},
+        ("time [s]", AGAINST_VELOCITY[1]), shaft_of_time, levels(15.0, dwell=0.3), dots=False,
+    ),
+    "position_inertia": Picture(
+        {"amplitude": 0.5, "order": 1.0, "phase": 0.0}, AGAINST_ANGLE, shaft_of_angle, levels(25.0, -25.0, dwell=0.4)
+    ),
     "backlash": Picture({"gap": 0.06}, ("time [s]", ASKED), motor, levels(12.0, -12.0, dwell=0.2), dots=False, masses=2),
     "hardening_stiffness": Picture(
         {"cubic_stiffness": 4e4}, ("time [s]", ASKED), motor, levels(25.0, -25.0, dwell=0.15), dots=False, masses=2
@@ -159,6 +166,12 @@ PICTURES: dict[str, Picture] = {
     "torque_lag": Picture({"time_constant": 4e-3}, ("time [s]", AT_ACTUATOR[1]), acting_in_time, STEP, dots=False),
     "integrator_clamp": Picture({"limit": 0.03}, ("time [s]", ASKED), controller, STEPS, dots=False),
     "command_rate_limit": Picture({"rate": 600.0}, ("time [s]", ASKED), controller, STEPS, dots=False),
+    "velocity_difference": Picture(
+        {"samples": 16.0}, ("time [s]", "seen minus true velocity [rad/s]"), sensor_in_time, STEP, dots=False
+    ),
+    "velocity_observer": Picture(
+        {"bandwidth": 500.0}, ("time [s]", "seen minus true velocity [rad/s]"), sensor_in_time, STEP, dots=False
+    ),
     "velocity_filter": Picture(
         {"time_constant": 4e-3}, ("time [s]", "seen minus true velocity [rad/s]"), sensor_in_time, STEP, dots=False
     ),

@@ -83,8 +83,8 @@ struct Drive {  // SI units, rad; neutral values
     double root = 0;        // drag root sqrt|w| sign(w)
     double hysteretic = 0;  // a Dahl spring beside the shaft, N m/rad, and what it yields at, N m
     double hysteretic_torque = 1;
-    double hum = 0;            // outside the library: torque in time,
-    double hum_frequency = 0;  // rad/s
+    double hum = 0;            // torque in time [N m],
+    double hum_frequency = 0;  // Hz
     double hum_phase = 0;
     double loaded = 0;       // dry friction as a share of the torque that gravity and the load put on the axis
     double walking = 0;      // dry friction walking (1 + W), W a random walk of walk_size in a second, never below 0,
@@ -164,7 +164,7 @@ struct End {
         if (!load) q -= d.ground * (x[angle] - d.rest);
         if (d.unbalance != 0) q -= d.unbalance * std::sin(turned(x) + d.unbalance_phase);
         if (d.cogging != 0) q -= d.cogging * std::sin(d.cogging_order * turned(x) + d.cogging_phase);
-        if (d.hum != 0) q += d.hum * std::sin(d.hum_frequency * t + d.hum_phase);
+        if (d.hum != 0) q += d.hum * std::sin(6.283185307179586477 * d.hum_frequency * t + d.hum_phase);
         if (d.root != 0) q -= d.root * std::sqrt(std::abs(x[speed])) * sign(x[speed]);
         return q;
     }

@@ -49,6 +49,9 @@ struct Shaft {  // effects at one end of the shaft
     double position_friction_amplitude = 0;
     double position_friction_order = 1;
     double position_friction_phase = 0;
+    double torque_hum_amplitude = 0;
+    double torque_hum_frequency = 0;
+    double torque_hum_phase = 0;
     // end of shaft fields
 };
 
@@ -65,6 +68,9 @@ struct Case {  // SI units, rad; neutral values; effect_parameter
     double DL = 0;
     double K = 0;  // N m/rad
     double D = 0;
+    double position_inertia_amplitude = 0;
+    double position_inertia_order = 1;
+    double position_inertia_phase = 0;
     double backlash_gap = 0;
     double hardening_stiffness_cubic_stiffness = 0;
     double hysteretic_coupling_torque = 1;
@@ -75,6 +81,8 @@ struct Case {  // SI units, rad; neutral values; effect_parameter
     double torque_lag_time_constant = 0;
     double integrator_clamp_limit = inf;
     double command_rate_limit_rate = inf;
+    double velocity_difference_samples = 0;  // 0: none is taken
+    double velocity_observer_bandwidth = inf;
     double velocity_filter_time_constant = 0;
     double velocity_ripple_amplitude = 0;
     double velocity_ripple_order = 1;
@@ -107,6 +115,12 @@ public:
         if (c.unbalance_amplitude != 0) T += c.unbalance_amplitude * std::sin(theta + c.unbalance_phase);
         if (c.cogging_amplitude != 0) T += c.cogging_amplitude * std::sin(c.cogging_order * theta + c.cogging_phase);
         return T;
+    }
+
+    // What drives it whatever it does.
+    double hum(double t) const {
+        constexpr double turn = 6.283185307179586477;
+        return c.torque_hum_amplitude * std::sin(turn * c.torque_hum_frequency * t + c.torque_hum_phase);
     }
 
     // Friction and drag without a jump at standstill.
@@ -168,7 +182,19 @@ public:
     // What the sensor shows.
     double sensed() const {
         const double step = c.velocity_quantisation_step;
-        return step > 0 ? std::nearbyint(filtered / step) * step : filtered;
+        const double seen = c.velocity_filter_time_constant > 0 ? filtered : tracking() ? tracked : measured();
+        return step > 0 ? std::nearbyint(seen / step) * step : seen;
+    }
+
+    // The angle is read, once a sample; the controller of the continuous loop reads it at every step.
+    void sample() {
+        angles.push_back(angle);
+        const double back = c.velocity_difference_samples * c.dt / control_time, whole = std::floor(back);
+        const auto at = [&](double samples) {
+            const auto i = static_cast<std::size_t>(samples);
+            return i < angles.size() ? angles[angles.size() - 1 - i] : angles.front();
+        };
+        if (back > 0) difference = (angle - at(whole) - (back - whole) * (at(whole + 1) - at(whole))) / (back * control_time);
     }
 
     void control(double r) {
@@ -181,32 +207,57 @@ public:
 
     // One fine step under the torque command v, its middle at time t.
     void step(double v, double t) {
+        const double last_measured = measured();
         const double middle = angle + 0.5 * h * w, braking = motor.load(middle);
         const double T = resonant(lagged(late(beyond(clip(v, c.torque_saturation_limit), c.torque_dead_band_width)))) - braking;
         const bool two = c.JL > 0;
+        const Inertia one = inertia(c.JM, !two, middle);
         bend(0.5 * h * (w - wL));
         const double Tc = two ? coupling() : 0;
-        const double damp = 0.5 * h * c.DM / c.JM;
-        const double free = ((1 - damp) * w + h / c.JM * (T - Tc - motor.smooth(w))) / (1 + damp);
-        const double next = beyond(free, h / c.JM * motor.level(w, free, t, middle, braking));
+        const double damp = 0.5 * h * c.DM / one.J;
+        const double pull_M = T + motor.hum(t) - Tc - motor.smooth(w) - 0.5 * one.slope * w * w;
+        const double free = ((1 - damp) * w + h / one.J * pull_M) / (1 + damp);
+        const double next = beyond(free, h / one.J * motor.level(w, free, t, middle, braking));
         if (two) {
-            const double damp_L = 0.5 * h * c.DL / c.JL;
             const double middle_L = angle_load + 0.5 * h * wL, braking_load = load.load(middle_L);
-            const double pull = Tc - braking_load - load.smooth(wL);
-            const double free_L = ((1 - damp_L) * wL + h / c.JL * pull) / (1 + damp_L);
-            const double next_L = beyond(free_L, h / c.JL * load.level(wL, free_L, t, middle_L, braking_load));
+            const Inertia other = inertia(c.JL, true, middle_L);
+            const double damp_L = 0.5 * h * c.DL / other.J;
+            const double pull = Tc + load.hum(t) - braking_load - load.smooth(wL) - 0.5 * other.slope * wL * wL;
+            const double free_L = ((1 - damp_L) * wL + h / other.J * pull) / (1 + damp_L);
+            const double next_L = beyond(free_L, h / other.J * load.level(wL, free_L, t, middle_L, braking_load));
             angle_load += 0.5 * h * (wL + next_L);
             wL = next_L;
         }
         angle += 0.5 * h * (w + next);
         w = next;
         bend(0.5 * h * (w - wL));
-        const double order = c.velocity_ripple_order, amplitude = c.velocity_ripple_amplitude;
-        const double ripple = amplitude != 0 ? amplitude * order * std::cos(order * angle + c.velocity_ripple_phase) : 0;
-        filtered += share(h, c.velocity_filter_time_constant) * (w * (1 + ripple) - filtered);
+        if (tracking()) {  // y' = v, v' = b^2 (x - y) - 2 b v, by the implicit midpoint rule
+            const double b = c.velocity_observer_bandwidth, hb = h * b, x = 0.5 * (last_measured + measured());
+            const double rate = (2 * tracked_rate + hb * b * (x - tracked)) / (2 + 2 * hb + 0.5 * hb * hb);
+            tracked += h * rate;
+            tracked_rate = 2 * rate - tracked_rate;
+        }
+        filtered += share(h, c.velocity_filter_time_constant) * ((tracking() ? tracked : measured()) - filtered);
     }
 
 private:
+    // An inertia at an angle, and its slope there.
+    struct Inertia {
+        double J, slope;
+    };
+    Inertia inertia(double J, bool changes, double theta) const {
+        if (!changes) return {J, 0};
+        const double a = J * c.position_inertia_amplitude, n = c.position_inertia_order, psi = n * theta + c.position_inertia_phase;
+        return {J + a * std::cos(psi), -a * n * std::sin(psi)};
+    }
+
+    bool tracking() const { return c.velocity_observer_bandwidth < inf; }
+    double measured() const {
+        if (c.velocity_difference_samples > 0) return difference;
+        const double order = c.velocity_ripple_order, amplitude = c.velocity_ripple_amplitude;
+        return w * (1 + (amplitude != 0 ? amplitude * order * std::cos(order * angle + c.velocity_ripple_phase) : 0));
+    }
+
     const Case& c;
     const double h, control_time;
     End motor, load;
@@ -214,6 +265,8 @@ private:
     std::vector<double> ring;
     std::size_t k = 0;
     double wound = 0;  // of the coupling's own bristle
+    std::vector<double> angles;  // of all samples
+    double difference = 0, tracked = 0, tracked_rate = 0;
     double w = 0, wL = 0, angle_load = 0, twist = 0, x1 = 0, x2 = 0, lag = 0, filtered = 0, integral = 0, error = 0, command = 0;
 
     // The torque at the middle of the fine step, `delay` steps ago.
@@ -276,6 +329,7 @@ extern "C" void fine_integrator(const Case* its, int samples, int fine, const do
     };
     for (int n = 0; n < samples; ++n) {
         const double target = source[n];
+        if (!analog) drive.sample();
         if (digital) {
             drive.control(target);
         } else if (!analog) {
@@ -287,6 +341,7 @@ extern "C" void fine_integrator(const Case* its, int samples, int fine, const do
             if (analog) drive.control(before + (target - before) * (static_cast<double>(j) / fine));
             const double middle = (n + (j + 0.5) / fine - (analog ? 1 : 0)) * c.dt;
             drive.step(analog ? 1.5 * drive.u - 0.5 * last : drive.u, std::max(middle, 0.0));
+            if (analog) drive.sample();
         }
         before = target;
         if (analog) write(n);  // the continuous loop's sample is the end of the interval

@@ -37,7 +37,7 @@ public:
     template <class R>
     using State = typename detail::StateAt<AtLoad, E, R>::Type;
     static constexpr Pace pace = E::pace;
-    static void prepare(const double* p, const Timing& time, Coefficients<double>& c) { E::prepare(p, time, c); }
+    static void prepare(const double* p, const PreparedFor& time, Coefficients<double>& c) { E::prepare(p, time, c); }
     static double substeps(const double* p, const Circumstances& at)
         requires(hook::substeps<E>)
     {

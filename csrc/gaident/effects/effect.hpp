@@ -4,8 +4,9 @@
 //     static constexpr Hooks hooks               which of the functions with a dash below it has
 //     static constexpr Pace pace                 how fine the substeps must be
 //     template <class R> struct Coefficients     what the sample loop needs of the parameters: members of type R; absent: none
-//     static void prepare(p, Timing, c)          parameters -> coefficients; absent where there are none
+//     static void prepare(p, PreparedFor, c)          parameters -> coefficients; absent where there are none
 //     template <class R> struct State            its memory, all zero where the record begins; absent: none
+//     static constexpr bool apart = true         where its state is not in the loop's own (registry.hpp); absent: it is
 //   - static double substeps(p, Circumstances)   how many a sample it asks for beyond its pace
 //
 // and a hook, the place in the loop where it acts; those of a shaft effect are asked at the motor, or at the load (at_load.hpp).
@@ -16,6 +17,9 @@
 //   - actuator            u' = actuator(c, u)                    the torque issued, once a control step [N m]
 //   - actuator_dynamics   T = actuator_dynamics(c, s, past, T)   its mean over the substep [N m]
 //   - torque              T' = T - torque(c, theta)              a torque that brakes, at the angle theta [rad]
+//   - torque_of_time      T' = T - torque_of_time(c, t)          one that is known by the time t [s] alone
+//   - inertia             inertia(c, theta, step)                what a change of the inertia does to the substep's equation; at the
+//                                                                load of two masses, else at the motor
 //   - law                 law(c, friction)                       once: its part of the friction law that is constant
 //   - level               level(c, t)                            dry friction known by the time t [s] alone [N m]
 //   - level_of_angle      level_of_angle(c, theta)               dry friction known by the angle theta [rad] alone [N m]
@@ -33,7 +37,7 @@
 //
 //   - begin(c, s, Beginning)   its state where the record begins in motion
 //   - possible(p)              false where there is no such drive
-//   - tabulate(p, Timing, t)   makes a `Table` t for what is not a number per lane; reach(t, steps): how many torques back it looks
+//   - tabulate(p, PreparedFor, t)   makes a `Table` t for what is not a number per lane; reach(t, steps): how many torques back it looks
 //   - later(p, delay)          its parameters with the controller's delay [s] added: so it acts where it is not in the model, too
 //
 // The compiler compares `hooks` with the functions that are there (registry.hpp).
@@ -51,7 +55,7 @@
 
 namespace gaident {
 
-enum class Place { shaft, coupling, actuator, controller, sensor, plant, record };
+enum class Place { shaft, mechanism, coupling, actuator, controller, sensor, plant, record };
 
 // The functions that an effect may have, a bit each.
 enum class Hooks : std::uint32_t {
@@ -79,6 +83,8 @@ enum class Hooks : std::uint32_t {
     load = 1U << 20,
     level_of_angle = 1U << 21,
     hysteresis = 1U << 22,
+    torque_of_time = 1U << 23,
+    inertia = 1U << 24,
 };
 constexpr Hooks operator|(Hooks a, Hooks b) {
     return static_cast<Hooks>(static_cast<std::uint32_t>(a) | static_cast<std::uint32_t>(b));
@@ -130,11 +136,13 @@ struct EffectInfo {
 // Substeps per sample at most.
 inline constexpr int max_substeps = 64;
 
-// The times that coefficients are made for.
-struct Timing {
-    double step;  // of the mechanism [s]
-    double hold;  // how long a torque is held [s]
-    int steps;    // while a torque is held
+// What coefficients are made for.
+struct PreparedFor {
+    double step;     // of the mechanism [s]
+    double hold;     // how long a torque is held [s]
+    int steps;       // while a torque is held
+    int per_sample;  // in a sample of the controller, or of the record in the continuous loop
+    double inertia;  // of the load where there are two masses, else of the motor's side [kg m^2]
 };
 
 enum class Pace {

@@ -24,9 +24,13 @@
 #include "friction/stribeck_friction.hpp"
 #include "load/cogging.hpp"
 #include "load/load_torque.hpp"
+#include "load/position_inertia.hpp"
+#include "load/torque_hum.hpp"
 #include "load/unbalance.hpp"
 #include "sensor/outliers.hpp"
+#include "sensor/velocity_difference.hpp"
 #include "sensor/velocity_filter.hpp"
+#include "sensor/velocity_observer.hpp"
 #include "sensor/velocity_quantisation.hpp"
 #include "sensor/velocity_ripple.hpp"
 
@@ -48,6 +52,8 @@ using Effects = EffectList<CoulombFriction,        //
                            FrictionDrift,          //
                            LoadDependentFriction,  //
                            PositionFriction,       //
+                           TorqueHum,              //
+                           PositionInertia,        //
                            Backlash,               //
                            HardeningStiffness,     //
                            HystereticCoupling,     //
@@ -57,6 +63,8 @@ using Effects = EffectList<CoulombFriction,        //
                            TorqueLag,              //
                            IntegratorClamp,        //
                            CommandRateLimit,       //
+                           VelocityDifference,     //
+                           VelocityObserver,       //
                            VelocityFilter,         //
                            VelocityRipple,         //
                            VelocityQuantisation,   //
@@ -123,6 +131,14 @@ constexpr EffectSet load_effects_with(Hooks hooks) {
     EffectSet set;
     LoadEffects::each([&]<class E>() {
         if ((E::AtMotor::hooks & hooks) != Hooks::none) set.add(effect<E>);
+    });
+    return set;
+}
+// Those that only the loop of several candidates has, see nonlinear/effect_run.hpp.
+constexpr EffectSet effects_in_lanes_only() {
+    EffectSet set = effects_with(Hooks::torque_of_time);
+    AllEffects::each([&]<class E>() {
+        if (Apart<E>) set.add(effect<E>);
     });
     return set;
 }

@@ -21,6 +21,11 @@ enum class Effect : std::uint8_t {};
 template <class E>
 struct Nothing {};
 
+// An effect whose state stands apart from the loop's own: few models have it, it is large or its functions are calls, and the loop's
+// state stays in registers.
+template <class E>
+concept Apart = requires { requires E::apart; };
+
 namespace detail {
 
 template <class E, class R>
@@ -63,6 +68,13 @@ template <class E>
 struct TableOf<E> {
     using Type = typename E::Table;
 };
+
+template <bool here, class E, class R>
+struct StateIf {
+    using Type = Nothing<E>;
+};
+template <class E, class R>
+struct StateIf<true, E, R> : StateOf<E, R> {};
 
 // E tells apart effects whose members look alike.
 template <class E, class Value>
@@ -110,6 +122,10 @@ concept actuator_dynamics = requires(C<E> c, S<E> s, const Past& past, double x)
 template <class E>
 concept torque = requires(C<E> c, double x) { E::torque(c, x); };
 template <class E>
+concept torque_of_time = requires(C<E> c, double x) { E::torque_of_time(c, x); };
+template <class E>
+concept inertia = requires(C<E> c, FrictionStep<double>& step, double x) { E::inertia(c, x, step); };
+template <class E>
 concept law = requires(C<E> c, FrictionLaw<double>& sum) { E::law(c, sum); };
 template <class E>
 concept level = requires(C<E> c, double x) { E::level(c, x); };
@@ -149,7 +165,7 @@ concept substeps = requires(const double* p, const Circumstances& at) { E::subst
 template <class E>
 concept possible = requires(const double* p) { E::possible(p); };
 template <class E>
-concept tabulate = HasTable<E> && requires(const double* p, const Timing& time, TableOf<E>& table) {
+concept tabulate = HasTable<E> && requires(const double* p, const PreparedFor& time, TableOf<E>& table) {
     E::tabulate(p, time, table);
     E::reach(table, time.steps);
 };
@@ -164,7 +180,7 @@ concept pace = requires {
     { E::pace } -> std::same_as<const Pace&>;
 };
 template <class E>
-concept prepare = requires(const double* p, const Timing& time, CoefficientsOf<E, double>& c) { E::prepare(p, time, c); };
+concept prepare = requires(const double* p, const PreparedFor& time, CoefficientsOf<E, double>& c) { E::prepare(p, time, c); };
 
 template <class E>
 constexpr Hooks all_of() {
@@ -178,13 +194,15 @@ constexpr Hooks all_of() {
            if_there(sensor<E>, Hooks::sensor) | if_there(sensor_dynamics<E>, Hooks::sensor_dynamics) |
            if_there(reading<E>, Hooks::reading) | if_there(plant<E>, Hooks::plant) | if_there(begin<E>, Hooks::begin) |
            if_there(substeps<E>, Hooks::substeps) | if_there(possible<E>, Hooks::possible) |
-           if_there(tabulate<E>, Hooks::tabulate) | if_there(later<E>, Hooks::later) | if_there(load<E>, Hooks::load);
+           if_there(tabulate<E>, Hooks::tabulate) | if_there(later<E>, Hooks::later) | if_there(load<E>, Hooks::load) |
+           if_there(torque_of_time<E>, Hooks::torque_of_time) | if_there(inertia<E>, Hooks::inertia);
 }
 
 // Those of which an effect at this place has to have one.
 constexpr Hooks acting_at(Place place) {
     switch (place) {
-        case Place::shaft: return Hooks::torque | dry_hooks | Hooks::load;
+        case Place::shaft: return Hooks::torque | Hooks::torque_of_time | dry_hooks | Hooks::load;
+        case Place::mechanism: return Hooks::inertia;
         case Place::coupling: return Hooks::coupling | Hooks::hysteresis;
         case Place::actuator: return Hooks::actuator | Hooks::actuator_dynamics;
         case Place::controller: return Hooks::command | Hooks::controller;
@@ -262,17 +280,24 @@ struct EffectList {
             return static_cast<const detail::Slot<One, CoefficientsOf<One, R>>&>(*this).value;
         }
     };
-    template <class R>
-    struct States : detail::Slot<E, StateOf<E, R>>... {
+    // The states in the loop's own, or those that stand apart.
+    template <class R, bool apart>
+    struct StatesOf : detail::Slot<E, typename detail::StateIf<Apart<E> == apart, E, R>::Type>... {
         template <class One>
-        [[gnu::always_inline]] StateOf<One, R>& of() {
-            return static_cast<detail::Slot<One, StateOf<One, R>>&>(*this).value;
+        using Of = typename detail::StateIf<Apart<One> == apart, One, R>::Type;
+        template <class One>
+        [[gnu::always_inline]] Of<One>& of() {
+            return static_cast<detail::Slot<One, Of<One>>&>(*this).value;
         }
         template <class One>
-        [[gnu::always_inline]] const StateOf<One, R>& of() const {
-            return static_cast<const detail::Slot<One, StateOf<One, R>>&>(*this).value;
+        [[gnu::always_inline]] const Of<One>& of() const {
+            return static_cast<const detail::Slot<One, Of<One>>&>(*this).value;
         }
     };
+    template <class R>
+    using States = StatesOf<R, false>;
+    template <class R>
+    using StatesApart = StatesOf<R, true>;
     struct Tables : detail::Slot<E, TableOf<E>>... {
         template <class One>
         [[gnu::always_inline]] const TableOf<One>& of() const {

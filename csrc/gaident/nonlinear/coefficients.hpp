@@ -11,6 +11,20 @@
 
 namespace gaident {
 
+// The ends of the shaft.
+enum class Side { motor, load };
+
+// call.operator()<Key, E>() for each effect of this side: E has its functions, under Key its coefficients and state are kept.
+template <Side side, class Call>
+[[gnu::always_inline]] inline void each_at(Call&& call) {
+    if constexpr (side == Side::motor) {
+        Effects::each([&]<class E>() __attribute__((always_inline)) { call.template operator()<E, E>(); });
+    } else {
+        LoadEffects::each([&]<class Key>()
+                              __attribute__((always_inline)) { call.template operator()<Key, typename Key::AtMotor>(); });
+    }
+}
+
 template <class R>
 struct EffectConstants {
     // The plant in observer form at the substep, and its state at the record's start ...

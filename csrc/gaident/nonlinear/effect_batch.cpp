@@ -137,7 +137,7 @@ private:
     }
 
     void effects(std::span<const std::size_t> group, EffectSet set, OwnEffects* own, Write write) {
-        const bool alone = group.size() == 1 && own == nullptr;
+        const bool alone = group.size() == 1 && own == nullptr && !set.meets(effects_in_lanes_only());
         const std::size_t width = alone ? 1 : effect_lanes;
         const Planned& first = planned_[group[0]];
         std::vector<double> constants(effect_constants * width);

@@ -29,9 +29,12 @@ class EffectLoop {
     static constexpr bool is_servo = std::same_as<Control, Servo<R>>;
 
 public:
-    [[gnu::always_inline]] EffectLoop(const EffectRun& run, const EffectConstants<R>& constants)
+    using Apart = typename Effects::StatesApart<R>;
+
+    [[gnu::always_inline]] EffectLoop(const EffectRun& run, const EffectConstants<R>& constants, Apart& apart)
         : run_(run),
           c_(constants),
+          apart_(apart),
           plant_(constants, run.order),
           pi_(controller_of(run)),
           own_(run, plant_.velocity()),
@@ -40,7 +43,10 @@ public:
         h_ = run.sample_time / run.substeps;
         if constexpr (!is_servo)
             if (continuous) pi_ = ControllerState<R>(run.loop.controller, Clock{h_});
-        dry_ = run.effects.meets(effects_with(dry_hooks)) || own_.friction();
+        // A change of the inertia is in the equation that friction is in, at the end where it acts.
+        constexpr bool changing = Plant::changing && !Plant::both_ends;
+        dry_ = run.effects.meets(effects_with(changing ? dry_hooks | Hooks::inertia : dry_hooks)) || own_.friction();
+        beside_ = run.effects.meets(effects_with(Hooks::torque_of_time)) || own_.shaft();
         turning_ = run.effects.meets(effects_that_turn()) || own_.there();
         looking_back_ = run.effects.meets(effects_with(Hooks::tabulate));
         shaping_ = run.effects.meets(effects_with(Hooks::command)) || own_.command();
@@ -53,7 +59,7 @@ public:
             const auto& c = c_.effects.template of<E>();
             if constexpr (hook::controller<E>) E::controller(c, pi_);
             if constexpr (hook::law<E>) E::law(c, law_);
-            if constexpr (hook::begin<E>) E::begin(c, states_.template of<E>(), start);
+            if constexpr (hook::begin<E> && asks<E>) E::begin(c, state<E>(), start);
         });
         if constexpr (Plant::both_ends) begin_at_load();
         if constexpr (!is_servo) pi_.s = c_.stored;
@@ -201,12 +207,27 @@ private:
         });
     }
 
+    // Whether this loop has the effect at all.
+    template <class E>
+    static constexpr bool asks = OwnInLoop<R>::asks || !gaident::Apart<E>;
+
+    template <class E>
+    [[gnu::always_inline]] auto& state() {
+        if constexpr (gaident::Apart<E>) return apart_.template of<E>();
+        else return states_.template of<E>();
+    }
+    template <class E>
+    [[gnu::always_inline]] const auto& state() const {
+        if constexpr (gaident::Apart<E>) return apart_.template of<E>();
+        else return states_.template of<E>();
+    }
+
     [[gnu::always_inline]] bool filtering() const { return run_.effects.meets(effects_with(Hooks::sensor_dynamics)); }
     [[gnu::always_inline]] void filter() {
         Effects::chain(measured(), [&]<class E>(R x) __attribute__((always_inline)) {
-            if constexpr (hook::sensor_dynamics<E>)
+            if constexpr (hook::sensor_dynamics<E> && asks<E>)
                 if (run_.effects.has<E>()) [[likely]]
-                    return E::sensor_dynamics(c_.effects.template of<E>(), states_.template of<E>(), x);
+                    return E::sensor_dynamics(c_.effects.template of<E>(), state<E>(), x);
             return x;
         });
     }
@@ -214,8 +235,8 @@ private:
     // Of the last filter there is.
     [[gnu::always_inline]] R filter_output() const {
         return Effects::chain(plant_.velocity(), [&]<class E>(R x) __attribute__((always_inline)) {
-            if constexpr (hook::sensor_dynamics<E>)
-                if (run_.effects.has<E>()) return R(states_.template of<E>().output);
+            if constexpr (hook::sensor_dynamics<E> && asks<E>)
+                if (run_.effects.has<E>()) return R(state<E>().output);
             return x;
         });
     }
@@ -276,6 +297,12 @@ private:
 
     // A substep of the mechanism under the torque that is held, and its parts: effect_substep.hpp, which a user of the loop includes.
     void substep(int j, double t);
+    // The angle in the middle of the substep.
+    template <Side side>
+    [[gnu::always_inline]] R angle_at() const {
+        if constexpr (side == Side::motor) return theta_;
+        else return load_.theta;
+    }
     template <Side side, class States>
     R under_friction(States& states, const FrictionLaw<R>& law, const FreeEnd<R>& end, double t);
     R move_both(R T, R w, double t);
@@ -284,10 +311,12 @@ private:
 
     const EffectRun& run_;
     const EffectConstants<R>& c_;
+    Apart& apart_;
     Plant plant_;
     Control pi_;
     double h_, time_ = 0.0;
     bool dry_, turning_, looking_back_, shaping_;
+    bool beside_;  // whether torques of the time or of the user's own effects act at the motor
     OwnInLoop<R> own_;
     typename Effects::States<R> states_{};  // all zero
     FrictionLaw<R> law_;

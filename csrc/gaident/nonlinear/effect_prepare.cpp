@@ -176,7 +176,12 @@ void prepare_effects(const EffectModel& model, const EffectRecord& record, const
     if (s.p < 1) throw std::invalid_argument("poles: a model with effects needs more poles than zeros");
     const double Ts = record.sample_time, h = Ts / substeps;
     const bool continuous = loop.kind == LoopKind::continuous, open = loop.kind == LoopKind::open;
-    const Timing time{h, continuous ? h : Ts, continuous ? 1 : substeps};
+    // A change of the inertia is the load's where the mechanism has one.
+    const bool inertia = model.effects.meets(effects_with(Hooks::inertia)) && s == Structure{1, 2};
+    TwoMasses m{};
+    out.two_masses = model.effects.needs_two_masses() || own_at_load || inertia;
+    const bool load = out.two_masses && two_masses_of(model.linear, m);
+    const PreparedFor made{h, continuous ? h : Ts, continuous ? 1 : substeps, substeps, load ? m.JL : 1.0 / model.linear.gain};
     EffectConstants<double>& c = out.constants;
     c = EffectConstants<double>{};
 
@@ -188,13 +193,12 @@ void prepare_effects(const EffectModel& model, const EffectRecord& record, const
     AllEffects::each([&]<class E>() {
         if (!model.effects.has<E>()) return;
         const double* const p = model.of(effect<E>);
-        if constexpr (HasCoefficients<E>) E::prepare(p, time, c.of<E>());
-        if constexpr (HasTable<E>) E::tabulate(p, time, out.tables.template of<E>());
+        if constexpr (HasCoefficients<E>) E::prepare(p, made, c.of<E>());
+        if constexpr (HasTable<E>) E::tabulate(p, made, out.tables.template of<E>());
         if constexpr (hook::possible<E>) possible = possible && E::possible(p);
     });
     Delta<double> whole;
     if (moving) whole = plant_of(model.linear, loop, Ts);
-    out.two_masses = model.effects.needs_two_masses() || own_at_load;
     if (out.two_masses) two_masses(model, h, Ts, &whole, start, u, c);
     else observer(model.linear, h, substeps, &whole, start, u, c);
     if (!possible) c.x[0] = any_value;

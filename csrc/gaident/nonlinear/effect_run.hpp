@@ -90,9 +90,30 @@ template <class R>
     return loaded_level(run, c, theta);
 }
 
+// What brakes at an end of the shaft by the time t alone [N m], and the substep's equation under a change of the inertia.
+// Called with values, for the same reason.
+template <Side side, class R>
+[[gnu::noinline]] R torque_of_time(const EffectRun& run, const EffectConstants<R>& c, R t) {
+    R T = R(0.0);
+    each_at<side>([&]<class Key, class E>() __attribute__((always_inline)) {
+        if constexpr (hook::torque_of_time<E>)
+            if (run.effects.has<Key>()) T = T + E::torque_of_time(c.template of<Key>(), t);
+    });
+    return T;
+}
+template <class R>
+[[gnu::noinline]] FrictionStep<R> changed_inertia(const EffectRun& run, const EffectConstants<R>& c, R theta, FrictionStep<R> step) {
+    Effects::each([&]<class E>() __attribute__((always_inline)) {
+        if constexpr (hook::inertia<E>)
+            if (run.effects.has<E>()) E::inertia(c.effects.template of<E>(), theta, step);
+    });
+    return step;
+}
+
 // User-defined effects in the loop.
 // Few models have them: what asks them is apart and called with values, so that the loop's own state may stay in registers.
-// The loop of one candidate asks none: a single model with such effects runs in lanes, where the call costs the same.
+// The loop of one candidate asks none, nor effects whose state stands apart or that know the time (`effects_in_lanes_only`): a single
+// model with such effects runs in lanes, where the call costs the same.
 template <class R>
 class OwnInLoop {
 public:

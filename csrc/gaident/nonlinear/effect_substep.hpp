@@ -24,8 +24,12 @@ template <class R, class Plant, class Control>
         return x;
     });
     const R w = plant_.velocity();
-    if (own_.shaft()) [[unlikely]]
-        T = own_.with_torque(w, theta_, T, t);
+    if constexpr (OwnInLoop<R>::asks)
+        if (beside_) [[unlikely]] {
+            if (run_.effects.meets(effects_with(Hooks::torque_of_time)))
+                T = T - torque_of_time<Side::motor>(run_, c_, R(t > 0.0 ? t : 0.0));
+            if (own_.shaft()) T = own_.with_torque(w, theta_, T, t);
+        }
     R w_next;
     if constexpr (Plant::both_ends) {
         w_next = move_both(T, w, t);
@@ -54,6 +58,9 @@ template <Side side, class States>
         step.law.level_positive = step.law.level_positive + level;
         step.law.level_negative = step.law.level_negative + level;
     };
+    // A change of the inertia comes first: friction acts on what is left to be moved.
+    if constexpr (Plant::changing && side == (Plant::both_ends ? Side::load : Side::motor))
+        if (run_.effects.meets(effects_with(Hooks::inertia))) step = changed_inertia(run_, c_, angle_at<side>(), step);
     if constexpr (side == Side::motor)
         if (own_.friction()) add(own_.level());
     if constexpr (side == Side::load)
@@ -94,15 +101,17 @@ template <class R, class Plant, class Control>
 [[gnu::always_inline]] inline R EffectLoop<R, Plant, Control>::move_both(R T, R w, double t) {
     const R w_load = plant_.load_velocity();
     R T_load = R(0.0);
-    if (load_.turning || run_.effects.meets(load_effects_with(Hooks::torque))) {
+    if (load_.turning || run_.effects.meets(load_effects_with(Hooks::torque | Hooks::torque_of_time))) {
         const R at_motor = run_.position.empty() ? fma(w, R(0.5 * h_), angle_) : theta_;
         load_.theta = fnma(w - w_load, R(0.5 * h_), at_motor - (plant_.twist() - load_.twist_at_start));
         each_at<Side::load>([&]<class Key, class E>() __attribute__((always_inline)) {
             if constexpr (hook::torque<E>)
                 if (run_.effects.has<Key>()) T_load = T_load - E::torque(c_.template of<Key>(), load_.theta);
         });
+        load_.braking = R(0.0) - T_load;
+        if (run_.effects.meets(load_effects_with(Hooks::torque_of_time))) [[unlikely]]
+            T_load = T_load - torque_of_time<Side::load>(run_, c_, R(t > 0.0 ? t : 0.0));
     }
-    load_.braking = R(0.0) - T_load;
     if (load_.own.there()) [[unlikely]]
         T_load = T_load + load_.own.torque(run_, w_load, load_.theta, T, t);
     plant_.free_velocities(T, T_load, friction_torque_, load_.friction, states_);

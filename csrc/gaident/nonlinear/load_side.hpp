@@ -5,19 +5,6 @@
 
 namespace gaident {
 
-enum class Side { motor, load };
-
-// call.operator()<Key, E>() for each effect of this side: E has its functions, under Key its coefficients and state are kept.
-template <Side side, class Call>
-[[gnu::always_inline]] inline void each_at(Call&& call) {
-    if constexpr (side == Side::motor) {
-        Effects::each([&]<class E>() __attribute__((always_inline)) { call.template operator()<E, E>(); });
-    } else {
-        LoadEffects::each([&]<class Key>()
-                              __attribute__((always_inline)) { call.template operator()<Key, typename Key::AtMotor>(); });
-    }
-}
-
 // One end's equation of a substep without friction, w+ = w_free - beta f.
 template <class R>
 struct FreeEnd {
@@ -73,8 +60,8 @@ struct LoadSide {
 
     [[gnu::always_inline]] LoadSide(const EffectRun& run, R twist)
         : own(run),
-          dry(run.effects.meets(load_effects_with(dry_hooks)) || own.friction()),
-          turning(run.effects.meets(load_effects_that_turn()) || own.there()),
+          dry(run.effects.meets(load_effects_with(dry_hooks)) || run.effects.meets(effects_with(Hooks::inertia)) || own.friction()),
+          turning(run.effects.meets(load_effects_that_turn()) || run.effects.meets(effects_with(Hooks::inertia)) || own.there()),
           twist_at_start(twist) {}
 };
 struct NoLoadSide {

@@ -14,6 +14,7 @@ namespace gaident {
 template <class R, int N>
 struct ObserverPlant {
     static constexpr bool both_ends = false;           // whether effects act at the load, too
+    static constexpr bool changing = false;            // whether its inertia may change with the angle
     static constexpr bool remembers_friction = false;  // of the substep before
     static constexpr int capacity = N >= 0 ? N : max_plant_order;
     R a[capacity], b[capacity + 1], x[capacity];
@@ -59,6 +60,13 @@ struct ObserverPlant {
     }
 };
 
+// The same where the inertia changes with the angle: a loop of its own, so that the others' code contains nothing of it.
+template <class R>
+struct ChangingPlant : ObserverPlant<R, -1> {
+    static constexpr bool changing = true;
+    using ObserverPlant<R, -1>::ObserverPlant;
+};
+
 // Two masses with a nonlinear coupling.
 // Its correction over the substep is the mean along a twist that goes evenly to where the correction at the substep's start, and
 // the friction of the substep before, would bring it (second order). An effect of the coupling has
@@ -77,7 +85,7 @@ struct ObserverPlant {
 // Each leaves in x is left of the twist to the effects that follow.
 template <class R>
 struct TwoMassPlant {
-    static constexpr bool both_ends = false, remembers_friction = true;
+    static constexpr bool both_ends = false, remembers_friction = true, changing = false;
     R phi[3][3], motor[3], coupling[3];
     R KG, DG, per_scale;
     R x[3];      // w_M, w_L, psi
@@ -148,7 +156,7 @@ struct TwoMassPlant {
 // The same with torques and friction at the load, too (load_side.hpp solves it).
 template <class R>
 struct LoadedTwoMassPlant : TwoMassPlant<R> {
-    static constexpr bool both_ends = true;
+    static constexpr bool both_ends = true, changing = true;
     using TwoMassPlant<R>::x, TwoMassPlant<R>::motor, TwoMassPlant<R>::coupling, TwoMassPlant<R>::correction;
     // Response to a unit torque at the load.
     // The coupling's pulls the motor back by what it drives the load with,

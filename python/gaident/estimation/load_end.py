@@ -33,6 +33,7 @@ class LoadEnd:
     numerator: Vector
     denominator: Vector
     lengths: tuple[int, ...]  # samples of each record
+    inertia: float  # of the load [kg m^2]; nan where the model is no such mechanism
 
     @classmethod
     def of(cls, parameters: Parameterisation, x: Vector, data: DataSet) -> LoadEnd:
@@ -44,7 +45,8 @@ class LoadEnd:
         mechanics = mechanics_with_shaft_damping(np.array([K, a + e1, e0 + a * e1, a * e0, f1, f0]))
         damping = 0.0 if mechanics is None else mechanics[5] / mechanics[2]
         b, denominator, _ = cont2discrete(([damping, f0], [1.0, f1, f0]), parameters.scales.dt, method="foh")
-        return cls(np.ravel(b), np.asarray(denominator), tuple(data.lengths))
+        inertia = np.nan if mechanics is None else mechanics[2]
+        return cls(np.ravel(b), np.asarray(denominator), tuple(data.lengths), float(inertia))
 
     def carried(self, torques: Matrix) -> Matrix:
         """Rows of torque at the load as torques at the motor, the shaft at rest before each record."""

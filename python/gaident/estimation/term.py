@@ -79,9 +79,13 @@ class Term:
     family: str = ""
     excludes: frozenset[str] = frozenset()
     beside: frozenset[str] = frozenset()
-    harmonic: str = ""  # of "torque", "friction" or "velocity": phase and size follow from two columns per order of the angle
+    harmonic: str = (
+        ""  # of "torque", "friction", "inertia" or "velocity": phase and size follow from two columns per order of the angle
+    )
+    in_time: bool = False  # a sine of the time: phase and size follow from two columns per frequency
+    least: float = 0.0  # of its first parameter: what is less is no cause
     components: int = 0  # the first of the two coordinates that these columns belong to
-    orders: tuple[int, int] = (1, 1)  # lowest and highest order of a harmonic
+    orders: tuple[int, int] = (1, 1)  # lowest and highest order of a harmonic, or the number of frequencies of a sine of the time
     neutral: Callable[[float, Scales], tuple[float, ...]] | None = None  # the nested effect of this level as this one
     proportional: bool = False  # its torque is proportional to its one coordinate
     multimodal: bool = False  # one stop or impact more makes another local minimum: fitted in the loop first, searched globally
@@ -114,7 +118,7 @@ class Term:
 
     @property
     def search_cost(self) -> float:
-        """2 ln m, what it costs in BIC units to have chosen the best one of m orders of the angle; 0 without a choice.
+        """2 ln m, what it costs in BIC units to have chosen the best one of m orders or frequencies; 0 without a choice.
 
         The extended BIC of Chen and Chen (2008, Biometrika 95, 759) with gamma = 1, m the number of models of this size that were
         tried: chance alone makes the best of m candidates better by x with at most m times the probability of one.
@@ -144,7 +148,12 @@ class Term:
     @property
     def turns_with_the_shaft(self) -> bool:
         """Whether its torque is a harmonic of the angle."""
-        return self.harmonic in ("torque", "friction")
+        return self.harmonic in ("torque", "friction", "inertia")
+
+    @property
+    def chooses_order(self) -> bool:
+        """Whether it is a harmonic whose order is one of its numbers, the last of its coordinates."""
+        return bool(self.harmonic) and self.orders[1] > self.orders[0]
 
     @property
     def in_coupling(self) -> bool:

@@ -104,13 +104,36 @@ static void gaident_root(const gaident_shaft *k, gaident_friction *f) {
     f->more_at_rest -= drag;
 }
 
-/* w+ of this end of the shaft at w, and w_free without friction; t: time in the middle of the substep h. */
-static double gaident_dry(const gaident_shaft *k, gaident_shaft_memory *s, double h, double w, double w_free, double beta, double t) {
+/* Whether friction or a change of the inertia acts at the end of the shaft. */
+static int gaident_changes(const gaident_drive *k, int load) {
+    return (k->effects & GAIDENT_POSITION_INERTIA) && load == k->two_masses;
+}
+
+static int gaident_stiff(const gaident_drive *k, int load) {
+    return ((load ? &k->at_load : &k->at_motor)->effects & GAIDENT_DRY) || gaident_changes(k, load);
+}
+
+/* A change of the inertia: w+ (1 + beta (change cos(psi) - bend sin(psi) w)) = w_free + beta change cos(psi) w - beta f. */
+static void gaident_turned(const gaident_drive *k, double theta, gaident_friction *f) {
+    const double psi = fma(k->position_inertia.order, theta, k->position_inertia.phase);
+    const double change = k->position_inertia.change * cos(psi), bend = k->position_inertia.bend * sin(psi);
+    const double per = 1.0 / fma(f->beta, fma(-bend, f->w, change), 1.0);
+    f->w_free = fma(f->beta * change, f->w, f->w_free) * per;
+    f->beta *= per;
+}
+
+/* w+ of an end of the shaft at w, and w_free without friction; t: time in the middle of the substep. */
+static double gaident_dry(const gaident_drive *drive, gaident_memory *memory, int load, double w, double w_free, double beta,
+                          double t) {
+    const gaident_shaft *k = load ? &drive->at_load : &drive->at_motor;
+    gaident_shaft_memory *s = load ? &memory->at_load : &memory->at_motor;
+    const double h = drive->h;
     gaident_friction f = {0.0, 0.0, 0.0, {0.0, 0.0}, {0.0, 0.0}, 0.0, 0.0};
     double w_next;
     f.w = w;
     f.w_free = w_free;
     f.beta = beta;
+    if (gaident_changes(drive, load)) gaident_turned(drive, s->theta, &f);
     gaident_add_level(&f, k->coulomb_friction.torque);
     f.level[0] += k->asymmetric_friction.torque_positive;
     f.level[1] += k->asymmetric_friction.torque_negative;
@@ -144,6 +167,11 @@ static double gaident_braking(const gaident_shaft *k, double theta) {
     if (k->effects & GAIDENT_UNBALANCE) T += k->unbalance.amplitude * sin(theta + k->unbalance.phase);
     if (k->effects & GAIDENT_COGGING) T += k->cogging.amplitude * sin(fma(k->cogging.order, theta, k->cogging.phase));
     return T;
+}
+
+/* The torque that drives this end whatever it does, in the middle of the substep. */
+static double gaident_hum(const gaident_shaft *k, double t) {
+    return k->effects & GAIDENT_TORQUE_HUM ? k->torque_hum.mean * sin(fma(k->torque_hum.turns, t, k->torque_hum.phase)) : 0.0;
 }
 
 /* -- coupling: what play, hardening and hysteresis add to the linear coupling torque -------------------------------------------------- */
@@ -197,8 +225,8 @@ static void gaident_observer(const gaident_drive *k, gaident_memory *s, double T
     const double w = s->x[0], w_free = fma(-k->a[0], w, fma(k->b[1], T, w)) + (n > 1 ? s->x[1] : 0.0);
     double w_next = w_free;
     int i;
-    if (k->at_motor.effects & GAIDENT_DRY) {
-        w_next = gaident_dry(&k->at_motor, &s->at_motor, k->h, w, w_free, k->b[1], t);
+    if (gaident_stiff(k, 0)) {
+        w_next = gaident_dry(k, s, 0, w, w_free, k->b[1], t);
         T -= (w_free - w_next) / k->b[1];
     }
     for (i = 1; i < n; ++i) s->x[i] = fma(-k->a[i], w, fma(k->b[i + 1], T, s->x[i])) + (i + 1 < n ? s->x[i + 1] : 0.0);
@@ -218,14 +246,14 @@ static void gaident_both_dry(const gaident_drive *k, gaident_memory *s, double w
         double free = fma(-across, f_load, w_free), b = beta_load;
         s->at_motor = motor;
         s->at_load = load;
-        *w_next = gaident_dry(&k->at_motor, &s->at_motor, k->h, s->x[0], free, beta, t);
+        *w_next = gaident_dry(k, s, 0, s->x[0], free, beta, t);
         f = (free - *w_next) / beta;
         free = fma(-back, f, w_free_load);
         if (*w_next == 0.0) {
             free = fma(-(back / beta), w_free, w_free_load);
             b = fma(-(back / beta), across, b);
         }
-        *w_next_load = gaident_dry(&k->at_load, &s->at_load, k->h, s->x[1], free, b, t);
+        *w_next_load = gaident_dry(k, s, 1, s->x[1], free, b, t);
         f_load = (free - *w_next_load) / b;
     }
     s->at_motor.friction = (fma(-across, f_load, w_free) - *w_next) / beta;
@@ -239,7 +267,7 @@ static void gaident_masses(const gaident_drive *k, gaident_memory *s, double T, 
     for (i = 0; i < 3; ++i) load[i] = k->motor[i] + k->coupling[i];
     s->at_load.theta = fma(0.5 * k->h, s->x[1], s->angle) - x0;
     s->at_load.braking = gaident_braking(&k->at_load, s->at_load.theta);
-    T_load = -s->at_load.braking;
+    T_load = gaident_hum(&k->at_load, t) - s->at_load.braking;
     for (i = 0; i < 3; ++i) {
         free[i] = fma(k->phi[3 * i], s->x[0], fma(k->motor[i], T, s->x[i])) +
                   fma(k->phi[3 * i + 2], s->x[2], k->phi[3 * i + 1] * s->x[1]);
@@ -254,14 +282,14 @@ static void gaident_masses(const gaident_drive *k, gaident_memory *s, double T, 
     for (i = 0; i < 3; ++i) free[i] = fma(k->coupling[i], mean, free[i]);
     w_next = free[0];
     w_next_load = free[1];
-    if ((k->at_motor.effects & GAIDENT_DRY) && (k->at_load.effects & GAIDENT_DRY)) {
+    if (gaident_stiff(k, 0) && gaident_stiff(k, 1)) {
         gaident_both_dry(k, s, free[0], free[1], t, &w_next, &w_next_load);
-    } else if (k->at_load.effects & GAIDENT_DRY) {
-        w_next_load = gaident_dry(&k->at_load, &s->at_load, k->h, s->x[1], free[1], load[1], t);
+    } else if (gaident_stiff(k, 1)) {
+        w_next_load = gaident_dry(k, s, 1, s->x[1], free[1], load[1], t);
         s->at_load.friction = (free[1] - w_next_load) / load[1];
         w_next = fma(-load[0], s->at_load.friction, w_next);
-    } else if (k->at_motor.effects & GAIDENT_DRY) {
-        w_next = gaident_dry(&k->at_motor, &s->at_motor, k->h, s->x[0], free[0], k->motor[0], t);
+    } else if (gaident_stiff(k, 0)) {
+        w_next = gaident_dry(k, s, 0, s->x[0], free[0], k->motor[0], t);
         s->at_motor.friction = (free[0] - w_next) / k->motor[0];
         w_next_load = fma(-k->motor[1], s->at_motor.friction, w_next_load);
     }
@@ -276,6 +304,56 @@ static double gaident_measured(const gaident_drive *k, const gaident_memory *s) 
     if (!(k->effects & GAIDENT_VELOCITY_RIPPLE)) return s->x[0];
     return s->x[0] * (1.0 + k->velocity_ripple.amplitude * k->velocity_ripple.order *
                                 cos(k->velocity_ripple.order * s->angle + k->velocity_ripple.phase));
+}
+
+/* What the sensor shows after a substep, through what is in series there: the last of them that there is. */
+static double gaident_shown(const gaident_drive *k, const gaident_memory *s) {
+    if (k->effects & GAIDENT_VELOCITY_FILTER) return s->velocity_filter.output;
+    if (k->effects & GAIDENT_VELOCITY_OBSERVER) return s->velocity_observer.output;
+    if (k->effects & GAIDENT_VELOCITY_DIFFERENCE) return s->velocity_difference.output;
+    return gaident_measured(k, s);
+}
+
+/* The mean velocity over the last samples. */
+static double gaident_difference(const gaident_drive *k, gaident_memory *s, double now) {
+    double left, all;
+    int i;
+    s->velocity_difference.steps += 1.0;
+    s->velocity_difference.sum =
+        fma(k->velocity_difference.step, 0.5 * (s->velocity_difference.w + now), s->velocity_difference.sum);
+    s->velocity_difference.w = now;
+    if (s->velocity_difference.steps > k->velocity_difference.last) {
+        for (i = GAIDENT_DIFFERENCES - 1; i > 0; --i) s->velocity_difference.mean[i] = s->velocity_difference.mean[i - 1];
+        s->velocity_difference.mean[0] = s->velocity_difference.sum;
+        s->velocity_difference.sum = s->velocity_difference.steps = 0.0;
+    }
+    left = fma(-k->velocity_difference.step, s->velocity_difference.steps, k->velocity_difference.samples);
+    all = s->velocity_difference.sum;
+    for (i = 0; i < GAIDENT_DIFFERENCES; ++i) {
+        const double part = fmin(fmax(left - i, 0.0), 1.0), *m = s->velocity_difference.mean;
+        const double slope = m[i > 0 ? i - 1 : 0] - m[i + 1 < GAIDENT_DIFFERENCES ? i + 1 : i];
+        all = fma(part, fma(0.25 * (1.0 - part), slope, m[i]), all);
+    }
+    return s->velocity_difference.output = all * k->velocity_difference.per_samples;
+}
+
+static double gaident_track(const gaident_drive *k, gaident_memory *s, double now) {
+    const double step = now - s->velocity_observer.w, behind = s->velocity_observer.output - s->velocity_observer.w;
+    const double slope = s->velocity_observer.slope;
+    s->velocity_observer.output = now + fma(k->velocity_observer.of_step, step,
+                                            fma(k->velocity_observer.of_v, slope, k->velocity_observer.of_y * behind));
+    s->velocity_observer.slope = fma(k->velocity_observer.slope_of_step, step,
+                                     fma(k->velocity_observer.slope_of_v, slope, k->velocity_observer.slope_of_y * behind));
+    s->velocity_observer.w = now;
+    return s->velocity_observer.output;
+}
+
+static double gaident_filter(const gaident_drive *k, gaident_memory *s, double now) {
+    const double before = k->velocity_filter.decay * s->velocity_filter.output;
+    s->velocity_filter.output =
+        fma(k->velocity_filter.of_new, now, fma(k->velocity_filter.of_old, s->velocity_filter.w, before));
+    s->velocity_filter.w = now;
+    return s->velocity_filter.output;
 }
 
 /* A linear drive: the velocity answers within the sample where b[0] is not 0, so that the loop is solved, then limited. */
@@ -300,7 +378,7 @@ static double gaident_linear_step(const gaident_drive *k, gaident_memory *s, dou
 
 /* A drive with effects: velocity read, torque issued, then the substeps. `issued`: torques on their way. */
 static double gaident_effects_step(const gaident_drive *k, gaident_memory *s, double *issued, double input, double *torque) {
-    double y = k->effects & GAIDENT_VELOCITY_FILTER ? s->velocity_filter.output : gaident_measured(k, s), u = input;
+    double y = gaident_shown(k, s), u = input;
     int j;
     if (k->effects & GAIDENT_VELOCITY_QUANTISATION) y = nearbyint(y / k->velocity_quantisation.step) * k->velocity_quantisation.step;
     if (k->closed) {
@@ -322,7 +400,7 @@ static double gaident_effects_step(const gaident_drive *k, gaident_memory *s, do
     }
     for (j = 0; j < k->substeps; ++j) {
         const double w = s->x[0];
-        double T = u;
+        double T = u, y_next;
         if (k->effects & GAIDENT_TRANSPORT_DELAY) {
             const int back = k->transport_delay.back[j], length = k->transport_delay.length;
             const double old = issued[(s->newest - back + length) % length];
@@ -336,19 +414,16 @@ static double gaident_effects_step(const gaident_drive *k, gaident_memory *s, do
         }
         s->at_motor.theta = s->theta;
         s->at_motor.braking = gaident_braking(&k->at_motor, s->theta);
-        T -= s->at_motor.braking;
+        T += gaident_hum(&k->at_motor, s->time + 0.5 * k->h) - s->at_motor.braking;
         s->theta = fma(1.5 * k->h, w, s->angle);
         if (k->two_masses) gaident_masses(k, s, T, s->time + 0.5 * k->h);
         else gaident_observer(k, s, T, s->time + 0.5 * k->h);
         s->time += k->h;
         s->angle = fma(0.5 * k->h, w + s->x[0], s->angle);
-        if (k->effects & GAIDENT_VELOCITY_FILTER) {
-            const double now = gaident_measured(k, s);
-            const double before = k->velocity_filter.decay * s->velocity_filter.output;
-            s->velocity_filter.output =
-                fma(k->velocity_filter.of_new, now, fma(k->velocity_filter.of_old, s->velocity_filter.w, before));
-            s->velocity_filter.w = now;
-        }
+        y_next = gaident_measured(k, s);
+        if (k->effects & GAIDENT_VELOCITY_DIFFERENCE) y_next = gaident_difference(k, s, y_next);
+        if (k->effects & GAIDENT_VELOCITY_OBSERVER) y_next = gaident_track(k, s, y_next);
+        if (k->effects & GAIDENT_VELOCITY_FILTER) gaident_filter(k, s, y_next);
     }
     return y;
 }

@@ -5,7 +5,8 @@
 #ifndef GAIDENT_RUNTIME_DECLARED
 #define GAIDENT_RUNTIME_DECLARED
 
-enum { GAIDENT_ORDER = 14 }; /* of a mechanism, at most */
+enum { GAIDENT_ORDER = 14 };       /* of a mechanism, at most */
+enum { GAIDENT_DIFFERENCES = 16 }; /* samples over which the angle is subtracted, at most */
 
 enum { /* the effects that act */
     GAIDENT_COULOMB_FRICTION = 1 << 0,
@@ -33,6 +34,10 @@ enum { /* the effects that act */
     GAIDENT_SQUARE_ROOT_DRAG = 1 << 22,
     GAIDENT_POSITION_FRICTION = 1 << 23,
     GAIDENT_HYSTERETIC_COUPLING = 1 << 24,
+    GAIDENT_TORQUE_HUM = 1 << 25,
+    GAIDENT_POSITION_INERTIA = 1 << 26,
+    GAIDENT_VELOCITY_DIFFERENCE = 1 << 27,
+    GAIDENT_VELOCITY_OBSERVER = 1 << 28,
     GAIDENT_DRY = GAIDENT_COULOMB_FRICTION | GAIDENT_STRIBECK_FRICTION | GAIDENT_ASYMMETRIC_FRICTION |
                   GAIDENT_PRESLIDING_FRICTION | GAIDENT_LUGRE_FRICTION | GAIDENT_QUADRATIC_DRAG |
                   GAIDENT_FRICTION_DRIFT | GAIDENT_LOAD_DEPENDENT_FRICTION | GAIDENT_SQUARE_ROOT_DRAG |
@@ -54,6 +59,7 @@ typedef struct { /* what acts at one end of the shaft */
     struct { double torque, rate; } friction_drift;
     struct { double torque, share; } load_dependent_friction;
     struct { double torque, change, order, phase; } position_friction;
+    struct { double mean, turns, phase; } torque_hum;
 } gaident_shaft;
 
 typedef struct {
@@ -71,6 +77,7 @@ typedef struct {
 
     gaident_shaft at_motor, at_load;
     long effects; /* the others */
+    struct { double change, bend, order, phase; } position_inertia; /* of the load of two masses, else of all */
     struct { double half_gap; } backlash;
     struct { double cubic; } hardening_stiffness;
     struct { double stiffness, per_break; } hysteretic_coupling;
@@ -80,6 +87,8 @@ typedef struct {
     struct { double decay, mean; } torque_lag;
     struct { double limit; } integrator_clamp;
     struct { double step; } command_rate_limit;
+    struct { double samples, per_samples, step, last; } velocity_difference;
+    struct { double of_y, of_v, of_step, slope_of_y, slope_of_v, slope_of_step; } velocity_observer;
     struct { double decay, of_old, of_new; } velocity_filter;
     struct { double amplitude, order, phase; } velocity_ripple;
     struct { double step; } velocity_quantisation;
@@ -109,6 +118,8 @@ typedef struct {
     struct { double z, x; } hysteretic_coupling; /* deflection, and the twist to which it belongs [rad] */
     struct { double T; } torque_lag;
     struct { double before; } command_rate_limit;
+    struct { double output, mean[GAIDENT_DIFFERENCES], sum, w, steps; } velocity_difference;
+    struct { double output, slope, w; } velocity_observer;
     struct { double output, w; } velocity_filter;
 } gaident_memory;
 

@@ -47,7 +47,7 @@ class Row(NamedTuple):
     ----------
     name : str
         Name of the effect.
-    place : {"shaft", "coupling", "actuator", "controller", "sensor", "plant", "record"}
+    place : {"shaft", "mechanism", "coupling", "actuator", "controller", "sensor", "plant", "record"}
         Where it acts.
     parameters : tuple of Parameter
         Its parameters with units and bounds.
@@ -76,7 +76,7 @@ class Row(NamedTuple):
     """
 
     name: str
-    place: str  # shaft, coupling, actuator, controller, sensor, plant or record
+    place: str  # shaft, mechanism, coupling, actuator, controller, sensor, plant or record
     parameters: tuple[Parameter, ...]
     meaning: str
     simulated: bool  # False: found in records, but not part of a model

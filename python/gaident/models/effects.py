@@ -369,6 +369,9 @@ def checked_effects(effects: Iterable[Effect], p: int, q: int) -> tuple[Effect, 
             f"the model has p = 0 (as many zeros as poles) and cannot carry {found[0].name}: effects need a drive "
             "with inertia; use a model with more poles than zeros"
         )
+    changed = next((effect.name for effect in found if effect.row.place == "mechanism"), None)
+    if changed is not None and in_series is not None and (p, q) == (1, 2):
+        raise ModelError(f"{changed} and {in_series} cannot be simulated together: take one of them out with without_effect")
     for effect in found:
         if not effect.row.needs_two_masses:
             continue

@@ -43,6 +43,12 @@ def _lag(values: Sequence[float]) -> Transfer:
     return Transfer(1.0 / tau, (complex(-1.0 / tau),)) if tau > 0.0 else Transfer()
 
 
+def _tracking(values: Sequence[float]) -> Transfer:
+    """1/(1 + s/b)^2."""
+    (b,) = values
+    return Transfer(b * b, (complex(-b), complex(-b))) if np.isfinite(b) else Transfer()
+
+
 def _delay(values: Sequence[float]) -> Transfer:
     return Transfer(delay=values[0])
 
@@ -52,6 +58,7 @@ LINEAR: dict[str, Callable[[Sequence[float]], Transfer]] = {
     "transport_delay": _delay,
     "torque_lag": _lag,
     "velocity_filter": _lag,
+    "velocity_observer": _tracking,
 }
 """Effect -> its transfer function, from its parameters in the order of the table."""
 

@@ -70,4 +70,10 @@ class Records:
         SAMPLED,
     )
     gravity_turn: float = record(1 / 6, "turns", "of travel: below, a torque once per turn is a constant or a spring", REGRESSION)
+    inertia_share: float = record(
+        1e-3,
+        "1",
+        "least change of an inertia with its angle that is a cause: other waves are simulated no more exactly (docs/effects.md)",
+        DRIVES,
+    )
     swing_damping: float = record(0.5, "1", "damping ratio below which two masses swing as on a shaft", DRIVES)

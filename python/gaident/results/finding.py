@@ -37,7 +37,7 @@ class Finding:
         What speaks for it, one sentence.
     is_noise : bool
         Whether it describes the record rather than the drive.
-    place : {"controller", "actuator", "shaft", "coupling", "plant", "sensor", "record"}
+    place : {"controller", "actuator", "shaft", "mechanism", "coupling", "plant", "sensor", "record"}
         Where it is: the effect's place in `gaident.effects.table()`.
         It is "controller" for all that the logged torque shows to differ from the given controller.
     sides : tuple of {"motor", "load"}

@@ -54,6 +54,8 @@ inline const Sizes sizes[] = {
     {effect<FrictionDrift>, {0.05, -0.2}, {1e-14, -0.2}},
     {effect<LoadDependentFriction>, {0.04, 0.2}, {1e-14, 1e-14}},
     {effect<PositionFriction>, {0.05, 0.6, 3.0, 0.4}, {1e-14, 0.6, 3.0, 0.4}},
+    {effect<TorqueHum>, {0.04, 50.0, 0.3}, {1e-14, 50.0, 0.3}},
+    {effect<PositionInertia>, {0.3, 1.0, 0.4}, {1e-14, 1.0, 0.4}},
     {effect<Backlash>, {0.01}, {1e-15}},
     {effect<HardeningStiffness>, {1e3}, {1e-10}},
     {effect<HystereticCoupling>, {0.1, 1.0}, {1e-12, 1e-9}},
@@ -63,6 +65,8 @@ inline const Sizes sizes[] = {
     {effect<TorqueLag>, {1e-3}, {1e-16}},
     {effect<IntegratorClamp>, {0.05}, {1e14}},
     {effect<CommandRateLimit>, {3000.0}, {1e14}},
+    {effect<VelocityDifference>, {3.0}, {0.0}},  // it has no slight one
+    {effect<VelocityObserver>, {3000.0}, {1e16}},
     {effect<VelocityFilter>, {1e-3}, {1e-16}},
     {effect<VelocityRipple>, {0.005, 2.0, 0.2}, {1e-14, 2.0, 0.2}},
     {effect<VelocityQuantisation>, {0.6}, {1e-13}},

@@ -31,9 +31,9 @@ struct Brake {
     static constexpr Pace pace = Pace::fine;
 #endif
 #if defined(MISSPELT_PREPARE)
-    static void prepair(const double* p, const Timing&, Coefficients<double>& c) { c.torque = p[0]; }
+    static void prepair(const double* p, const PreparedFor&, Coefficients<double>& c) { c.torque = p[0]; }
 #else
-    static void prepare(const double* p, const Timing&, Coefficients<double>& c) { c.torque = p[0]; }
+    static void prepare(const double* p, const PreparedFor&, Coefficients<double>& c) { c.torque = p[0]; }
 #endif
 
 #if defined(MISSPELT_OPTION)

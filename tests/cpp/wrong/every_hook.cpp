@@ -12,7 +12,7 @@ struct All {
                                    Hooks::torque | Hooks::law | Hooks::level | Hooks::loaded | Hooks::friction |
                                    Hooks::after_friction | Hooks::coupling | Hooks::sensor | Hooks::sensor_dynamics |
                                    Hooks::reading | Hooks::plant | Hooks::begin | Hooks::substeps | Hooks::possible |
-                                   Hooks::tabulate | Hooks::level_of_angle | Hooks::hysteresis;
+                                   Hooks::tabulate | Hooks::level_of_angle | Hooks::hysteresis | Hooks::torque_of_time | Hooks::inertia;
     static constexpr Pace pace = Pace::sample;
 
     template <class R>
@@ -27,10 +27,10 @@ struct All {
         int back;
     };
 
-    static void prepare(const double*, const Timing&, Coefficients<double>&);
+    static void prepare(const double*, const PreparedFor&, Coefficients<double>&);
     static double substeps(const double*, const Circumstances&);
     static bool possible(const double*);
-    static void tabulate(const double*, const Timing&, Table&);
+    static void tabulate(const double*, const PreparedFor&, Table&);
     static int reach(const Table&, int);
     static Factors<double> plant(const double*, Factors<double>);
     static double loaded_twist(const Coefficients<double>&, double, double, double);
@@ -52,6 +52,10 @@ struct All {
     static R level(const Coefficients<R>&, R);
     template <class R>
     static R level_of_angle(const Coefficients<R>&, R);
+    template <class R>
+    static R torque_of_time(const Coefficients<R>&, R);
+    template <class R>
+    static void inertia(const Coefficients<R>&, R, FrictionStep<R>&);
     template <class R>
     static R loaded(const Coefficients<R>&, R);
     template <class R>
@@ -113,6 +117,14 @@ struct LevelOfAngle : All {
     static double level_of_angle();
 };
 static_assert(lacks<LevelOfAngle>(Hooks::level_of_angle));
+struct TorqueOfTime : All {
+    static double torque_of_time();
+};
+static_assert(lacks<TorqueOfTime>(Hooks::torque_of_time));
+struct Inertia : All {
+    static void inertia();
+};
+static_assert(lacks<Inertia>(Hooks::inertia));
 struct Loaded : All {
     static double loaded();
 };

@@ -237,14 +237,15 @@ def test_an_anti_windup_is_said_and_its_free_run_not_trusted() -> None:
 
 def test_a_hum_gets_its_frequency_and_size_and_a_lattice_its_noise() -> None:
     found = ga.diagnose(limited_drive(math.inf, hum=0.03, step=0.1), CONTROLLER)
-    assert found.verdict == "unexplained" and found.driver == "time" and found.line is not None, found.summary()
-    frequency, torque = found.line
-    assert frequency == pytest.approx(37.0, abs=0.3) and torque == pytest.approx(0.03, rel=0.1)
-    assert "like a torque of 37 Hz and 0.03" in " ".join(found.summary().split())
+    (cause,) = found.causes
+    assert found.verdict == "explained" and (cause.effect, cause.alternatives) == ("torque_hum", ()), found.summary()
+    assert cause.parameters["frequency"].value == pytest.approx(37.0, abs=0.03)
+    assert cause.parameters["amplitude"].value == pytest.approx(0.03, rel=0.05)
     assert found.before.noise_floor >= 0.1 / math.sqrt(12.0)
 
 
 def test_a_hum_in_two_records_is_one_frequency_with_a_phase_of_each() -> None:
+    """No effect has a phase of each record: what it is like is said of the error that is left."""
     whole = limited_drive(math.inf, hum=0.03)
     found = ga.diagnose([whole[: len(whole) // 2], limited_drive(math.inf, seed=1, hum=0.03)[len(whole) // 3 :]], CONTROLLER)
     assert found.driver == "time" and found.line is not None, found.summary()

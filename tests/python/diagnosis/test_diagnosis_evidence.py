@@ -275,7 +275,7 @@ def test_the_smoother_is_fast_and_refuses_what_it_cannot_see() -> None:
 
 def test_the_staircase_triggers_almost_everything() -> None:
     found = excitation(drive(Tc=0.05, samples=4000), CONTROLLER, TWO_MASS.model())
-    assert set(found.not_testable) == set()
+    assert set(found.not_testable) == {"velocity_difference"}  # its velocities are not rounded to an encoder's counts
     assert found.reversals >= 8 and 4 < found.revolutions < 5
     assert len([v for v in found.speeds if v]) >= 6 and found.steps[-1] == 100.0
     assert set(found.one_sided) >= {"torque_saturation", "integrator_clamp", "command_rate_limit"}
@@ -306,6 +306,7 @@ def test_a_single_step_says_what_it_cannot_judge() -> None:
         "backlash",
         "hardening_stiffness",
         "hysteretic_coupling",
+        "velocity_difference",
     }
     assert set(found.not_testable) - {"torque_dead_band"} == expected
     assert found.not_testable["asymmetric_friction"] == "the axis turns forwards only"

@@ -28,7 +28,7 @@ EFFECTS = {
     *("unbalance", "cogging", "friction_drift", "backlash", "hardening_stiffness", "torque_saturation", "torque_dead_band"),
     *("transport_delay", "torque_lag", "integrator_clamp", "command_rate_limit", "velocity_filter", "velocity_ripple"),
     *("extra_resonance", "lugre_friction", "load_dependent_friction", "hysteretic_coupling", "square_root_drag"),
-    "position_friction",
+    *("position_friction", "torque_hum", "position_inertia", "velocity_difference", "velocity_observer"),
 }
 
 
@@ -87,7 +87,7 @@ def test_the_first_experiment_triggers_the_whole_library() -> None:
     still = ga.Record(DT, proposal.command, 0.0 * proposal.command)
     done = ga.run(MASS, still, ga.PI(**GAINS))
     found = excitation(ga.Record(DT, proposal.command, done.velocity, torque=done.torque), ga.PI(**GAINS))
-    assert dict(found.not_testable) == {}
+    assert set(found.not_testable) == {"velocity_difference"}  # the simulated velocities are not rounded to an encoder's counts
     assert len(found.steps) >= 5 and found.reversals > 20 and found.repeated
     assert 0.75 < found.highest_torque <= 1.5
 

@@ -380,3 +380,23 @@ def test_neutral_parameters_are_the_identity() -> None:
             parameters["zero_frequency"] = parameters["frequency"]
         model = TWO.model().with_effect(row.name, **parameters)
         assert np.array_equal(ga.simulate(model, rec, ctl), plain), row.name
+
+
+def test_a_changing_inertia_keeps_its_energy() -> None:
+    """Without torque and damping J(theta) w^2/2 stays what it is, through many turns."""
+    J, a, n = 5e-4, 0.6, 2.0
+    still = ga.Record(1e-3, torque=np.zeros(2000), velocity=np.full(2000, 30.0))
+    model = ga.OneMass(J, 1e-12).model().with_effect("position_inertia", amplitude=a, order=n, phase=0.3)
+    done = ga.run(model, still, initial_state=initial_state(ga.OneMass(J, 1e-12).model(), still), substeps=16)
+    energy = 0.5 * J * (1.0 + a * np.cos(n * done.position + 0.3)) * done.velocity**2
+    assert done.velocity.max() > 1.5 * done.velocity.min() > 0.0
+    assert np.ptp(energy) < 2e-3 * energy.mean()
+
+
+def test_a_difference_is_the_mean_over_its_samples() -> None:
+    rec = record(1e-3, "open")
+    run = ga.run(ONE.model(), rec)
+    seen = ga.simulate(ONE.model().with_effect("velocity_difference", samples=3.0), rec)
+    np.testing.assert_allclose(seen[3:], (run.position[3:] - run.position[:-3]) / 3e-3, rtol=0, atol=2e-3 * rms(run.velocity))
+    with pytest.raises(ga.GaidentError, match="samples must be 1 or more"):
+        ONE.model().with_effect("velocity_difference", samples=0.5)

@@ -97,7 +97,9 @@ def test_c_is_what_is_simulated(compiled: ctypes.CDLL, name: str) -> None:
     source = TORQUE if controller is None else COMMAND
     still = np.zeros(N)
     rec = ga.Record(DT, command=source, velocity=still) if controller else ga.Record(DT, torque=source, velocity=still)
-    turning = any(e.name in ("cogging", "unbalance", "velocity_ripple", "position_friction") for e in model.effects)
+    turning = any(
+        e.name in ("cogging", "unbalance", "velocity_ripple", "position_friction", "position_inertia") for e in model.effects
+    )
     substeps = options.get("substeps", 16 if turning else None)
     expected = ga.run(model, rec, controller, substeps=substeps)  # type: ignore[arg-type]
     velocity, torque = np.empty(N), np.empty(N)

@@ -22,7 +22,6 @@ EQUIVALENT = {"torque_lag": "velocity_filter", "velocity_filter": "torque_lag"}
 CLASSES = (*EQUIVALENT, "load_torque", "asymmetric_friction")
 # What `driver` may say about an effect outside the library, and what such an effect really contains of the library.
 DRIVERS = {
-    "torque_hum": ("time",),
     "random_walk_friction": ("time",),
     "thermal_gain": ("time", "torque"),
     "resolver_error_of_speed": ("position", "velocity"),

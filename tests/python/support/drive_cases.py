@@ -314,7 +314,7 @@ def draw_effect(name: str, factor: float, plant: Plant, samples: int, rng: np.ra
         "velocity_ripple": {"amplitude": 5e-3 * factor, "order": float(rng.choice([1, 2, 4])), "phase": phase},
         "velocity_quantisation": {"step": 0.63 * factor},
         "outliers": {"fraction": max(3, round(0.002 * factor * samples)) / samples},
-        "torque_hum": {"amplitude": 0.03 * factor, "frequency": 2 * np.pi * float(rng.uniform(10, 50)), "phase": phase},
+        "torque_hum": {"amplitude": 0.03 * factor, "frequency": float(rng.uniform(10, 50)), "phase": phase},
         "position_friction": {"torque": 0.05 * factor, "amplitude": 0.8, "order": float(rng.choice([1, 2, 3])), "phase": phase},
         # A torque of friction, beside a shaft that has as much stiffness as the element, from half of it to twice as much.
         "hysteretic_coupling": {"torque": 0.04 * factor, "stiffness": 0.4 * factor * plant.KG},

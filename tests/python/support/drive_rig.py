@@ -157,7 +157,7 @@ SHAFT = (
     "square_root_drag",
     "position_friction",
 )
-OUTSIDE = ("torque_hum", "random_walk_friction", "thermal_gain", "resolver_error_of_speed")
+OUTSIDE = ("random_walk_friction", "thermal_gain", "resolver_error_of_speed")
 COUPLING = ("backlash", "hardening_stiffness", "hysteretic_coupling")
 
 

@@ -20,7 +20,7 @@ struct TorqueDeadBand {
         R width;
     };
     static constexpr Pace pace = Pace::sample;
-    static void prepare(const double* p, const Timing&, Coefficients<double>& c) { c.width = p[0]; }
+    static void prepare(const double* p, const PreparedFor&, Coefficients<double>& c) { c.width = p[0]; }
     // In the continuous loop of one mass the torque crosses the band between the controller's steps.
     static double substeps(const double*, const Circumstances& at) {
         return at.loop.kind == LoopKind::continuous && at.plant.structure.p == 1 ? 16.0 : 1.0;

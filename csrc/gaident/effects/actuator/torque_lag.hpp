@@ -26,7 +26,7 @@ struct TorqueLag {
         R T;  // N m
     };
     static constexpr Pace pace = Pace::fine;
-    static void prepare(const double* p, const Timing& time, Coefficients<double>& c) {
+    static void prepare(const double* p, const PreparedFor& time, Coefficients<double>& c) {
         const Decay decay(time.step / p[0]);
         c.decay = decay.power;
         c.mean = decay.mean;

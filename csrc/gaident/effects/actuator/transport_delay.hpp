@@ -31,7 +31,7 @@ struct TransportDelay {
     static bool possible(const double* p) { return p[0] >= 0.0 && p[0] <= longest_delay; }
     // A static change of the torque, as saturation and dead band are, commutes with a delay: the controller's delay adds to this one.
     static void later(double* p, double delay) { p[0] += delay; }
-    static void tabulate(const double* p, const Timing& time, Table& table) {
+    static void tabulate(const double* p, const PreparedFor& time, Table& table) {
         const double delay = possible(p) ? p[0] : 0.0;
         for (int j = 0; j < time.steps; ++j) {
             mean(delay, time.hold, j, time.steps, table.back[j], table.share[j]);

@@ -25,7 +25,7 @@ struct CommandRateLimit {
         R before;  // rad/s
     };
     static constexpr Pace pace = Pace::sample;
-    static void prepare(const double* p, const Timing& time, Coefficients<double>& c) { c.step = p[0] * time.hold; }
+    static void prepare(const double* p, const PreparedFor& time, Coefficients<double>& c) { c.step = p[0] * time.hold; }
     template <class R>
     static void begin(const Coefficients<R>&, State<R>& s, const Beginning<R>& start) {
         s.before = start.command;

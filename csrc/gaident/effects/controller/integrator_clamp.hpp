@@ -20,7 +20,7 @@ struct IntegratorClamp {
         R limit;
     };
     static constexpr Pace pace = Pace::sample;
-    static void prepare(const double* p, const Timing&, Coefficients<double>& c) { c.limit = p[0]; }
+    static void prepare(const double* p, const PreparedFor&, Coefficients<double>& c) { c.limit = p[0]; }
 
     template <class R>
     static void controller(const Coefficients<R>& c, ControllerState<R>& pi) {

@@ -31,7 +31,7 @@ struct Backlash {
         R half_gap;
     };
     static constexpr Pace pace = Pace::finer;
-    static void prepare(const double* p, const Timing&, Coefficients<double>& c) { c.half_gap = 0.5 * p[0]; }
+    static void prepare(const double* p, const PreparedFor&, Coefficients<double>& c) { c.half_gap = 0.5 * p[0]; }
     static double loaded_twist(const Coefficients<double>& c, double, double linear, double x) {
         return x + __builtin_copysign(c.half_gap, linear);
     }

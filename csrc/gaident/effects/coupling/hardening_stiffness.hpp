@@ -21,7 +21,7 @@ struct HardeningStiffness {
         R cubic;
     };
     static constexpr Pace pace = Pace::finer;
-    static void prepare(const double* p, const Timing&, Coefficients<double>& c) { c.cubic = p[0]; }
+    static void prepare(const double* p, const PreparedFor&, Coefficients<double>& c) { c.cubic = p[0]; }
     // The twist x at which K x + k3 x^3 is what the linear coupling carries.
     static double loaded_twist(const Coefficients<double>& c, double K, double linear, double x) {
         for (int i = 0; i < 50 && c.cubic > 0.0; ++i) x -= (K * (x - linear) + c.cubic * x * x * x) / (K + 3.0 * c.cubic * x * x);

@@ -41,7 +41,7 @@ struct HystereticCoupling {
         R z, x;  // deflection, and the twist to which it belongs [rad]
     };
     static constexpr Pace pace = Pace::finer;
-    static void prepare(const double* p, const Timing&, Coefficients<double>& c) { c = {p[1], p[1] / p[0]}; }
+    static void prepare(const double* p, const PreparedFor&, Coefficients<double>& c) { c = {p[1], p[1] / p[0]}; }
     // The masses swing on this spring, too.
     static double substeps(const double* p, const Circumstances& at) {
         TwoMasses m{};

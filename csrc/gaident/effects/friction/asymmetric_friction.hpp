@@ -28,7 +28,7 @@ struct AsymmetricFriction {
         R torque_positive, torque_negative, viscous_positive, viscous_negative;
     };
     static constexpr Pace pace = Pace::fine;
-    static void prepare(const double* p, const Timing&, Coefficients<double>& c) { c = {p[0], p[1], p[2], p[3]}; }
+    static void prepare(const double* p, const PreparedFor&, Coefficients<double>& c) { c = {p[0], p[1], p[2], p[3]}; }
 
     template <class R>
     static void law(const Coefficients<R>& c, FrictionLaw<R>& friction) {

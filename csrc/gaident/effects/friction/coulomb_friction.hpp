@@ -22,7 +22,7 @@ struct CoulombFriction {
         R torque;
     };
     static constexpr Pace pace = Pace::fine;
-    static void prepare(const double* p, const Timing&, Coefficients<double>& c) { c.torque = p[0]; }
+    static void prepare(const double* p, const PreparedFor&, Coefficients<double>& c) { c.torque = p[0]; }
 
     template <class R>
     static void law(const Coefficients<R>& c, FrictionLaw<R>& friction) {

@@ -21,7 +21,7 @@ struct FrictionDrift {
         R torque, rate;
     };
     static constexpr Pace pace = Pace::fine;
-    static void prepare(const double* p, const Timing&, Coefficients<double>& c) { c = {p[0], p[1]}; }
+    static void prepare(const double* p, const PreparedFor&, Coefficients<double>& c) { c = {p[0], p[1]}; }
 
     template <class R>
     [[gnu::always_inline]] static R level(const Coefficients<R>& c, R t) {

@@ -44,7 +44,7 @@ struct LugreFriction {
         R w_before;  // rad/s
     };
     static constexpr Pace pace = Pace::finer;
-    static void prepare(const double* p, const Timing& time, Coefficients<double>& c) {
+    static void prepare(const double* p, const PreparedFor& time, Coefficients<double>& c) {
         c = {p[0], p[1], 1.0 / p[2], p[3], p[4], p[4] / time.step, p[1] / p[3]};
     }
     static double substeps(const double* p, const Circumstances& at) {

@@ -29,7 +29,7 @@ struct PositionFriction {
         R torque, change, order, phase;  // Tc, Tc a, n
     };
     static constexpr Pace pace = Pace::fine;
-    static void prepare(const double* p, const Timing&, Coefficients<double>& c) { c = {p[0], p[0] * p[1], p[2], p[3]}; }
+    static void prepare(const double* p, const PreparedFor&, Coefficients<double>& c) { c = {p[0], p[0] * p[1], p[2], p[3]}; }
     static double substeps(const double* p, const Circumstances& at) { return at.for_turns(p[2]); }
 
     template <class R>

@@ -30,7 +30,7 @@ struct PreslidingFriction {
     template <class R>
     using State = Bristle<R>;
     static constexpr Pace pace = Pace::fine;
-    static void prepare(const double* p, const Timing&, Coefficients<double>& c) { c = {p[1], p[1] / p[0], p[0] / p[1]}; }
+    static void prepare(const double* p, const PreparedFor&, Coefficients<double>& c) { c = {p[1], p[1] / p[0], p[0] / p[1]}; }
     static double substeps(const double* p, const Circumstances& at) {
         return __builtin_sqrt(__builtin_fabs(at.inverse_inertia * p[1])) * at.sample_time / 0.3;
     }

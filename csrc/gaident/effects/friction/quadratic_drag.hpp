@@ -21,7 +21,7 @@ struct QuadraticDrag {
         R coefficient;
     };
     static constexpr Pace pace = Pace::fine;
-    static void prepare(const double* p, const Timing&, Coefficients<double>& c) { c.coefficient = p[0]; }
+    static void prepare(const double* p, const PreparedFor&, Coefficients<double>& c) { c.coefficient = p[0]; }
 
     template <class R>
     static void law(const Coefficients<R>& c, FrictionLaw<R>& friction) {

@@ -30,7 +30,7 @@ struct SquareRootDrag {
         R coefficient;
     };
     static constexpr Pace pace = Pace::fine;
-    static void prepare(const double* p, const Timing&, Coefficients<double>& c) { c.coefficient = p[0]; }
+    static void prepare(const double* p, const PreparedFor&, Coefficients<double>& c) { c.coefficient = p[0]; }
 
     template <class R, class Memory>
     [[gnu::always_inline]] static void friction(const Coefficients<R>& c, Memory&, FrictionStep<R>& step) {

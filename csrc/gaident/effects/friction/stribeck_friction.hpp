@@ -32,7 +32,7 @@ struct StribeckFriction {
     };
     // A friction that falls with speed drives a resonance.
     static constexpr Pace pace = Pace::finer;
-    static void prepare(const double* p, const Timing&, Coefficients<double>& c) { c = {p[0], p[1], 1.0 / p[2]}; }
+    static void prepare(const double* p, const PreparedFor&, Coefficients<double>& c) { c = {p[0], p[1], 1.0 / p[2]}; }
     template <class R>
     static void begin(const Coefficients<R>&, State<R>& s, const Beginning<R>& start) {
         s.w_before = start.velocity;

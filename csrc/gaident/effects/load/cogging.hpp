@@ -25,7 +25,7 @@ struct Cogging {
         R amplitude, order, phase;
     };
     static constexpr Pace pace = Pace::fine;
-    static void prepare(const double* p, const Timing&, Coefficients<double>& c) { c = {p[0], p[1], p[2]}; }
+    static void prepare(const double* p, const PreparedFor&, Coefficients<double>& c) { c = {p[0], p[1], p[2]}; }
     static double substeps(const double* p, const Circumstances& at) { return at.for_turns(p[1]); }
 
     template <class R>

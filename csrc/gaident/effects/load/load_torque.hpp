@@ -21,7 +21,7 @@ struct LoadTorque {
         R load;
     };
     static constexpr Pace pace = Pace::sample;
-    static void prepare(const double* p, const Timing&, Coefficients<double>& c) { c.load = p[0]; }
+    static void prepare(const double* p, const PreparedFor&, Coefficients<double>& c) { c.load = p[0]; }
 
     template <class R>
     [[gnu::always_inline]] static R torque(const Coefficients<R>& c, R) {

@@ -21,7 +21,7 @@ struct Unbalance {
         R amplitude, phase;
     };
     static constexpr Pace pace = Pace::fine;
-    static void prepare(const double* p, const Timing&, Coefficients<double>& c) { c = {p[0], p[1]}; }
+    static void prepare(const double* p, const PreparedFor&, Coefficients<double>& c) { c = {p[0], p[1]}; }
     static double substeps(const double*, const Circumstances& at) { return at.for_turns(1.0); }
 
     template <class R>

@@ -26,7 +26,7 @@ struct VelocityFilter {
         R output, w;  // rad/s
     };
     static constexpr Pace pace = Pace::fine;
-    static void prepare(const double* p, const Timing& time, Coefficients<double>& c) {
+    static void prepare(const double* p, const PreparedFor& time, Coefficients<double>& c) {
         const Decay decay(time.step / p[0]);
         c = {decay.power, decay.mean - decay.power, 1.0 - decay.mean};
     }

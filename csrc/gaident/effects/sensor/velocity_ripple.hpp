@@ -25,7 +25,7 @@ struct VelocityRipple {
         R amplitude, order, phase;
     };
     static constexpr Pace pace = Pace::sample;
-    static void prepare(const double* p, const Timing&, Coefficients<double>& c) { c = {p[0], p[1], p[2]}; }
+    static void prepare(const double* p, const PreparedFor&, Coefficients<double>& c) { c = {p[0], p[1], p[2]}; }
 
     template <class R>
     [[gnu::always_inline]] static R sensor(const Coefficients<R>& c, R theta, R w) {

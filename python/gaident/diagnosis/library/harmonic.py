@@ -1,4 +1,4 @@
-"""What returns with every turn of the shaft: torques, and the ripple of an encoder."""
+"""What returns with every turn of the shaft: torques, an inertia, and the ripple of an encoder; and what returns in time."""
 
 from __future__ import annotations
 
@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 from gaident.diagnosis.library import triggers as t
 from gaident.diagnosis.library.cause import AT_THE_SHAFT, NO_REVERSAL, Cause
 from gaident.diagnosis.library.coordinates import HIGHEST_ORDER
-from gaident.diagnosis.library.kinds import harmonic
+from gaident.diagnosis.library.kinds import harmonic, tone
+from gaident.policy.table import POLICY
 
 __all__ = ["CAUSES"]
 
@@ -31,6 +32,9 @@ def _gravity_of_regression(values: Mapping[str, float]) -> dict[str, float] | No
         return None
     return {"amplitude": values["gravity_amplitude"], "phase": values["gravity_phase"]}
 
+
+FREQUENCIES = 5000  # no decision: a formula: of a spectrum of 10 000 lines
+"""How many a hum is the best of."""
 
 CAUSES: tuple[Cause, ...] = (
     harmonic(
@@ -57,6 +61,24 @@ CAUSES: tuple[Cause, ...] = (
         seen_angle=_behind_ripple,
         needs=(t.periodic, t.moves, t.period_of_an_order),
         unseen=t.orders_beyond,
+        excited_by=("slow constant speeds",),
+    ),
+    harmonic(
+        "position_inertia", "mechanism", 1, True, "inertia",
+        domains=AT_THE_SHAFT,
+        excludes=frozenset({"extra_resonance"}),
+        least=POLICY.inertia_share,
+        orders=(1, HIGHEST_ORDER),
+        needs=(t.periodic, t.moves, t.period_of_an_order),
+        unseen=t.orders_beyond,
+        excited_by=("random signal at speed", "speeds mixed in time"),
+    ),
+    tone(
+        "torque_hum",
+        domains=frozenset({"time"}),
+        orders=(1, FREQUENCIES),
+        needs=(t.one_record,),
+        unseen=t.frequencies_beyond,
         excited_by=("slow constant speeds",),
     ),
 )  # fmt: skip

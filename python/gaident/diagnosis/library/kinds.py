@@ -12,10 +12,13 @@ from gaident.diagnosis.library.cause import Cause
 from gaident.diagnosis.library.coordinates import positive
 from gaident.estimation.term import PHASE, Rows, Scales
 
-__all__ = ["FREE", "harmonic", "linear", "single"]
+__all__ = ["FREE", "harmonic", "linear", "single", "tone"]
 
 FREE = 1e6  # no decision: what an argument may be: a bound that nothing reaches;
 """Times the largest torque of the log: a pendulum that swings with little friction has far more torque than drives it."""
+
+LARGEST_SHARE = 0.95  # no decision: a formula: an inertia is above 0 at every angle
+"""Of an inertia that changes with its angle: beyond it there is next to none at some angle."""
 
 Vector = NDArray[np.float64]
 Matrix = NDArray[np.float64]
@@ -59,11 +62,41 @@ def linear(effect: str, name: str, low: Callable[[Scales], float], high: Callabl
     )
 
 
-def harmonic(effect: str, place: str, first: int, with_order: bool, kind: str, **known: Any) -> Cause:
-    """A harmonic of the angle: (a cos(phase), a sin(phase)[, order]) -> (amplitude[, order], phase)."""
+def tone(effect: str, **known: Any) -> Cause:
+    """A torque of one frequency in time: (a cos(phase), a sin(phase), frequency) -> (amplitude, frequency, phase)."""
 
     def natural(z: Matrix) -> Matrix:
-        columns = [np.hypot(z[:, 0], z[:, 1])]
+        return np.column_stack([np.hypot(z[:, 0], z[:, 1]), z[:, 2], np.arctan2(z[:, 1], z[:, 0])])
+
+    def coordinates(p: Mapping[str, float]) -> Vector:
+        a, phase = p["amplitude"], p["phase"]
+        return np.array([a * np.cos(phase), a * np.sin(phase), p["frequency"]])
+
+    def limits(s: Scales) -> Rows:
+        a, fastest = 10.0 * s.torque, 0.5 / s.dt
+        return [(-a, a), (-a, a), (1e-3 * fastest, fastest)]
+
+    return Cause(
+        effect,
+        "shaft",
+        natural,
+        coordinates,
+        limits,
+        lambda s: [],
+        lambda s: (0.05 * s.torque, 0.05 * s.torque, 0.02 / s.duration),
+        in_time=True,
+        scales={"phase": PHASE},
+        **known,
+    )
+
+
+def harmonic(effect: str, place: str, first: int, with_order: bool, kind: str, **known: Any) -> Cause:
+    """A harmonic of the angle: (a cos(phase), a sin(phase)[, order]) -> (amplitude[, order], phase)."""
+    share = kind == "inertia"
+
+    def natural(z: Matrix) -> Matrix:
+        size = np.hypot(z[:, 0], z[:, 1])
+        columns = [np.minimum(size, LARGEST_SHARE) if share else size]
         if with_order:
             columns.append(z[:, 2])
         columns.append(np.arctan2(z[:, 1], z[:, 0]))
@@ -75,7 +108,7 @@ def harmonic(effect: str, place: str, first: int, with_order: bool, kind: str, *
         return np.array([*pair, p["order"]] if with_order else pair)
 
     def amplitude(s: Scales) -> float:
-        return s.torque if kind == "torque" else 0.2
+        return s.torque if kind == "torque" else LARGEST_SHARE if share else 0.2
 
     def limits(s: Scales) -> Rows:
         a = (10.0 if with_order else FREE) * amplitude(s) if kind == "torque" else amplitude(s)

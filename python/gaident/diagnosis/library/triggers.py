@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from gaident.axis import TURN, Text, joined, order, say, turns
 from gaident.control.controller import Controller
+from gaident.data.signals.lattice import lattice_step
 from gaident.diagnosis.library.coordinates import HIGHEST_ORDER
 from gaident.models.model import Model
 from gaident.policy.table import POLICY
@@ -105,9 +106,31 @@ def periodic(s: Motions) -> Text | None:
     return Text("positions are lengths on a linear axis: with which length it returns, they do not say; give its pitch")
 
 
+def one_record(s: Motions) -> Text | None:
+    """Of what goes on whatever the axis does: in another record it is anywhere in its period."""
+    return None if len(s.records) == 1 else Text("its phase is another one in each record: give one record alone")
+
+
 def moves(s: Motions) -> Text | None:
     """The axis moves."""
     return None if any(np.any(m.moving) for m in s.records) else Text("the axis does not move")
+
+
+def every_sample(s: Motions) -> Text | None:
+    """The log has a line for each sample of a digital controller."""
+    if s.controller is None:
+        return None
+    if s.controller.loop == "continuous":
+        return Text("the controller has no samples")
+    one = all(s.controller.log_every(m.dt) == 1 for m in s.records)
+    return None if one else Text("the log has fewer lines than the controller has samples")
+
+
+def on_a_lattice(s: Motions) -> Text | None:
+    """The velocities are whole numbers of a step, as the differences of an encoder's counts are."""
+    if all(lattice_step(m.velocity) > 0.0 for m in s.records):
+        return None
+    return Text("the velocities are no multiples of one step, as differences of an encoder's counts are")
 
 
 def both_directions(s: Motions) -> Text | None:
@@ -300,6 +323,12 @@ def resonance_beyond(s: Motions) -> Text:
         return say(text, POLICY.seen_measured * highest, 1e3 * dt, POLICY.seen_band * highest)
     text = "one above {:.3g} Hz would not have shown, of a shaft or another: the log has a line every {:.3g} ms"
     return say(text, POLICY.seen_band * highest, 1e3 * dt)
+
+
+def frequencies_beyond(s: Motions) -> Text:
+    """Frequencies in time that are too high for the sampling."""
+    highest = POLICY.seen_band * 0.5 / max(m.dt for m in s.records)  # no decision: a formula: of half the sampling frequency
+    return Text(f"one above {highest:.3g} Hz would not have shown: the log has too few lines")
 
 
 def orders_beyond(s: Motions) -> Text | None:

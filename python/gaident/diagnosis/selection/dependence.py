@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gaident.control.filtering import clamped_sum
+from gaident.diagnosis.selection.spectrum import lines
 from gaident.estimation.criterion import cost_of
 from gaident.estimation.least_squares import scored
 from gaident.estimation.noise_model import WHITE, ShaftNoise
@@ -79,12 +80,11 @@ def dependence(objective: Objective, fit: Fit) -> Dependence:
     data = objective.data
     J, error = objective.sensitivities(fit.hypothesis, fit.x)
     columns = _columns(objective, fit, error)
-    lines = _lines(project_out(J, error[None, :])[0], data.lengths)
     account = _Account(objective, J, error, fit)
     none = account.bic(np.zeros((0, len(error))))
     gains = {driver: none - account.bic(rows) for driver, rows in columns.items()}
     line = None
-    for pairs in lines:
+    for _, pairs in lines(project_out(J, error[None, :])[0], data.lengths):
         # A frequency that was searched for counts as a number more.
         gain = none - account.bic(pairs) - cost_of(1, objective.information)
         if gain > gains["time"] and (found := _torque_of_line(objective, fit, J, error, pairs)) is not None:
@@ -228,45 +228,6 @@ def _of_path(angle: Vector, lengths: tuple[int, ...]) -> Matrix:
 def _drifts(t: Vector, w: Vector) -> Matrix:
     s = t / (float(t.max()) or 1.0)
     return np.array([s, s * s, s * np.sign(w), s * w])
-
-
-def _lines(error: Vector, lengths: tuple[int, ...]) -> list[Matrix]:
-    """The frequencies that stand highest above the error's spectrum, each as rows cos, sin of every record by itself.
-
-    The frequency is that of all records, phase and size are each record's own: a hum knows nothing of when a log begins.
-    """
-    longest = max(lengths)
-    width, half = POLICY.spectrum_mean, POLICY.peak_half_width
-    if longest < POLICY.spectrum_samples:
-        return []
-    parts = np.split(error, np.cumsum(lengths)[:-1])
-    windowed = np.array([np.fft.rfft((e - e.mean()) * np.hanning(len(e)), longest) for e in parts])
-    spectrum: Vector = np.sum(np.abs(windowed) ** 2, axis=0)
-    kernel = np.ones(width) / width
-    level = np.convolve(np.pad(spectrum, width // 2, mode="reflect"), kernel, mode="valid")
-    height = spectrum / np.maximum(level, 1e-300)
-    height[:half] = 0.0
-    found = []
-    for _ in range(POLICY.starts):
-        k = int(np.argmax(height))
-        f = 2.0 * np.pi * _peak(spectrum, k) / longest
-        rows = np.zeros((2 * len(lengths), len(error)))
-        at = 0
-        for i, n in enumerate(lengths):
-            rows[2 * i : 2 * i + 2, at : at + n] = np.cos(f * np.arange(n)), np.sin(f * np.arange(n))
-            at += n
-        found.append(rows)
-        height[max(k - half, 0) : k + half + 1] = 0.0
-    return found
-
-
-def _peak(spectrum: Vector, k: int) -> float:
-    """Frequency of a peak between the lines of a Hann-windowed spectrum."""
-    if not 0 < k < len(spectrum) - 1:
-        return float(k)
-    a, b, c = np.log(spectrum[k - 1 : k + 2] + 1e-300)
-    curve = a - 2.0 * b + c
-    return float(k + (0.5 * (a - c) / curve if curve < 0.0 else 0.0))
 
 
 def _torque_of_line(objective: Objective, fit: Fit, jacobian: Matrix, error: Vector, pairs: Matrix) -> tuple[float, float] | None:

@@ -40,6 +40,7 @@ __all__ = [
     "rigid",
     "shafts",
     "swings",
+    "swings_at",
 ]
 
 Vector = NDArray[np.float64]
@@ -284,10 +285,15 @@ def drives_itself(fit: Fit) -> bool:
 
 
 def swings(fit: Fit) -> bool:
-    """Whether two masses are damped as those on a shaft: e1 < 2 zeta sqrt(e0), f1 < 2 zeta sqrt(f0)."""
-    if fit.parameters.masses == 1:
+    """Whether two masses are damped as those on a shaft; True for one."""
+    return swings_at(fit.parameters, fit.x)
+
+
+def swings_at(parameters: Parameterisation, x: Vector) -> bool:
+    """Whether two masses are damped as those on a shaft: e1 < 2 zeta sqrt(e0), f1 < 2 zeta sqrt(f0); True for one."""
+    if parameters.masses == 1:
         return True
-    _, _, e1, e0, f1, f0 = fit.parameters.base_values(fit.x[None, :])[0]
+    _, _, e1, e0, f1, f0 = parameters.base_values(x[None, :])[0]
     twice = 2.0 * POLICY.swing_damping  # no decision: a formula: 2 zeta w
     return bool(e0 > 0.0 and f0 > 0.0 and abs(e1) < twice * np.sqrt(e0) and abs(f1) < twice * np.sqrt(f0))
 

@@ -177,6 +177,8 @@ class ModelSpace:
         if not self.score(fuller) < self.score(simpler):
             return False
         more = [t for t in fuller.parameters.terms if t.name not in simpler.effects]
+        if any(fuller.parameters.effect_values(fuller.x[None, :], t.name)[0, 0] < t.least for t in more if t.least):
+            return False
         if any(set(t.nested) & set(simpler.effects) for t in more) and not self.generalises(simpler, fuller):
             return False
         if fuller.parameters.on_a_spring and not (simpler.parameters.on_a_spring or self.beyond_simulation(simpler, fuller)):

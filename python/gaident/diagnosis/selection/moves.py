@@ -125,6 +125,8 @@ class Moves(Repeated):
         rankings = [test.ranked(WHITE), test.ranked(None)] if self.whitens else [test.ranked(WHITE)]
         if self.whitens and self.quiet(now):
             # Where only noise is left the linearised gains are accurate enough: only effects with a promising one are fitted.
+            # Many candidates explain a part of that noise, and the filter of what they leave misses an effect that is there.
+            rankings.append(test.ranked(now.noise))
             rankings = [[s for s in ranking if s.hope > self.policy.hope * self.penalty] for ranking in rankings]
             if not any(rankings):
                 return self._best(now, fits)
@@ -328,6 +330,28 @@ class Moves(Repeated):
                 short = fit.hypothesis.without(t.name)
                 z, x = fit.x[fit.parameters.slot(t.name)], fit.parameters.removed(fit.x, t.name)
                 found.append(self.refitted(short.extended(other), short.parameters.inserted(x, z)))
+        return found
+
+    def other_wave(self, fit: Fit) -> list[Fit]:
+        """Each harmonic of the angle as another one of the same order, where more than noise is left."""
+        return [] if self.quiet(fit) else [f for t in fit.parameters.terms for f in self.as_other_wave(fit, t)]
+
+    def as_other_wave(self, fit: Fit, term: Term) -> list[Fit]:
+        """The model with another harmonic of the same order in the place of one; empty for what is no harmonic.
+
+        Torque, ripple and inertia of one order are alike at each speed: one of them explains the most of another one.
+        """
+        if not term.chooses_order or term.levels:
+            return []
+        short, x = fit.hypothesis.without(term.name), fit.parameters.removed(fit.x, term.name)
+        blocked = {name for other in short.parameters.terms for name in other.excludes} | set(fit.effects)
+        order = float(fit.x[fit.parameters.slot(term.name)][-1])
+        found = []
+        for other in [o for o in self.allowed if o.chooses_order and not o.levels and o.name not in blocked]:
+            if not other.excludes.isdisjoint(short.effects) or order < other.orders[0]:
+                continue
+            start = np.append(np.zeros(other.size - 1), order)
+            found.append(self.refitted(short.extended(other), short.parameters.inserted(x, start)))
         return found
 
     def prefers(self, other: Fit, fit: Fit) -> bool:

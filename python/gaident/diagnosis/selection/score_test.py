@@ -26,9 +26,11 @@ from numpy.typing import NDArray
 
 from gaident.axis import TURN
 from gaident.control.filtering import filtered
-from gaident.diagnosis.selection.mechanisms import evenly_damped
+from gaident.diagnosis.selection.mechanisms import evenly_damped, swings_at
+from gaident.diagnosis.selection.spectrum import lines
 from gaident.estimation import least_squares as ls
 from gaident.estimation.criterion import gained
+from gaident.estimation.dataset import DataSet
 from gaident.estimation.load_end import LoadEnd
 from gaident.estimation.noise_model import WHITE, NoiseFilter
 from gaident.estimation.objective import LOST, Fit, Hypothesis, Objective
@@ -142,8 +144,9 @@ class ScoreTest:
         parameters, onto = hypothesis.parameters, (hypothesis, x)
         for term in terms:
             longer = hypothesis.extended(term)
-            if term.harmonic:
-                orders, columns = self._columns(hypothesis, x, term, base.error)
+            if term.harmonic or term.in_time:
+                of_term = self._columns if term.harmonic else self._in_time
+                orders, columns = of_term(hypothesis, x, term, base.error)
                 if len(orders):
                     rows = np.zeros((len(orders), term.size))
                     if term.size > 2:
@@ -169,7 +172,11 @@ class ScoreTest:
 
     def _columns(self, hypothesis: Hypothesis, x: Vector, term: Term, error: Vector) -> tuple[Vector, Matrix]:
         """(orders, columns): decrease of the raw error per unit of the two components, a pair of rows per order."""
-        end = LoadEnd.of(hypothesis.parameters, x, self.data) if term.at_load else None
+        end = None
+        if term.at_load or (term.harmonic == "inertia" and hypothesis.parameters.masses == 2):  # no decision: of two masses
+            if not swings_at(hypothesis.parameters, x):
+                return np.zeros(0), np.zeros((0, len(error)))
+            end = LoadEnd.of(hypothesis.parameters, x, self.data)
         angle = self.data.angle if end is None else end.angle(self.data.angle)
         first, last = term.orders
         per_period = TURN / (self.data.period or TURN)  # 1 but on a linear axis, whose orders count in its pitch
@@ -186,20 +193,45 @@ class ScoreTest:
         if last == 1:
             seen |= turned > POLICY.gravity_turn * TURN
         orders = orders[seen & (orders * per_sample < POLICY.seen_band * np.pi)]
+        # A change of the inertia beside another wave of its order is what the simulation of that one misses.
+        taken = [t for t in hypothesis.parameters.terms if t.chooses_order and "inertia" in (t.harmonic, term.harmonic)]
+        orders = orders[~np.isin(orders, [float(x[hypothesis.parameters.slot(t.name)][-1]) for t in taken])]
         if len(orders) == 0:
             return orders, np.zeros((0, len(error)))
         waves = _harmonics(per_period * angle, np.rint(orders / per_period))
         w = self.objective.measured - error
         if term.turns_with_the_shaft:
             parts = [-waves.imag, -waves.real]
+            there = w if end is None else end.carried(w[None, :])[0]
             if term.harmonic == "friction":
-                way = np.sign(w if end is None else end.carried(w[None, :])[0])
+                way = np.sign(there)
                 parts = [-way * waves.real, way * waves.imag]
+            if term.harmonic == "inertia":
+                # Of J (1 + a cos(psi)): -J a (cos(psi) dw/dt - n/2 sin(psi) w^2), psi = n theta + phase
+                inertia = 1.0 / hypothesis.parameters.base_values(x[None, :])[0][0] if end is None else end.inertia
+                slope, bend = _slope(there, self.data), 0.5 * orders[:, None] * there**2
+                parts = [
+                    -inertia * (waves.real * slope - bend * waves.imag),
+                    inertia * (waves.imag * slope + bend * waves.real),
+                ]
             pairs = np.stack(parts, axis=1).reshape(-1, len(angle))
             pairs = pairs if end is None else end.carried(pairs)
             return orders, hypothesis.predictor.torque_response(hypothesis.parameters, x, pairs)
         w = w * orders[:, None]
         return orders, np.stack([w * waves.real, -w * waves.imag], axis=1).reshape(-1, len(angle))
+
+    def _in_time(self, hypothesis: Hypothesis, x: Vector, term: Term, error: Vector) -> tuple[Vector, Matrix]:
+        """(frequencies [Hz], columns) of the highest peaks of the error's spectrum, as `_columns` has them for orders."""
+        end = LoadEnd.of(hypothesis.parameters, x, self.data) if term.at_load else None
+        found, pairs = [], []
+        for radians, rows in lines(error, self.data.lengths):
+            if radians < POLICY.seen_band * np.pi:
+                found.append(radians / (2.0 * np.pi * self.data.dt))
+                pairs += [rows[1::2].sum(axis=0), rows[0::2].sum(axis=0)]
+        if not found:
+            return np.zeros(0), np.zeros((0, len(error)))
+        torques = np.array(pairs) if end is None else end.carried(np.array(pairs))
+        return np.array(found), hypothesis.predictor.torque_response(hypothesis.parameters, x, torques)
 
     def _narrow(self, rows: Matrix, base: _Base) -> Matrix:
         """Resonances between those of the start rows that lower the error most, without and with the noise filter of the base."""
@@ -313,6 +345,11 @@ class ScoreTest:
         f = noise or self.objective.noise_of(base.error, base.hypothesis.predictor.closed)
         v = self.objective.whitened(base.error[None, :], f)[0]
         return self.objective.bic(float(v @ v), f, base.hypothesis.parameters.size)
+
+
+def _slope(w: Vector, data: DataSet) -> Vector:
+    """dw/dt [rad/s^2] of each record."""
+    return np.concatenate([np.gradient(part, data.dt) for part in np.split(w, np.cumsum(data.lengths)[:-1])])
 
 
 def _harmonics(angle: Vector, orders: Vector) -> NDArray[np.complex128]:

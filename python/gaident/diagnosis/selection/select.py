@@ -254,7 +254,7 @@ def _beam(space: Moves) -> Beam[Fit]:
 
 
 def _reductions(space: Moves) -> tuple[Callable[[Fit], list[Fit]], ...]:
-    return space.close, space.exchange, space.other_side, space.drop, space.simplify, space.demote
+    return space.close, space.exchange, space.other_wave, space.other_side, space.drop, space.simplify, space.demote
 
 
 def _improved(space: Moves, other: Fit, best: Fit) -> Fit:

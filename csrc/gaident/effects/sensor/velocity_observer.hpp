@@ -1,0 +1,55 @@
+// The velocity of a tracking loop on the angle, of second order and critically damped, omega its bandwidth:
+//
+//     dq/dt = y + 2 omega (theta - q),   dy/dt = omega^2 (theta - q),   y/w = 1/(1 + s/omega)^2
+//
+// exact for a velocity w that is linear over the substep: with a = omega h, d = (w+ - w)/a, g = y - w + 2 d, v = (dy/dt)/omega,
+//
+//     y+ = w+ - 2 d + e^-a ((1 + a) g + a (v - d)),   v+ = d + e^-a ((1 - a) (v - d) - a g)
+#pragma once
+
+#include "../effect.hpp"
+
+namespace gaident {
+
+struct VelocityObserver {
+    static constexpr EffectParameter parameters[] = {{"bandwidth", "rad/s", infinite, 0.0, infinite, true}};
+    static constexpr EffectInfo info{
+        .name = "velocity_observer",
+        .place = Place::sensor,
+        .meaning = "the velocity is that of a tracking loop on the {angle}, second order",
+        .parameters = parameters,
+    };
+    static constexpr Hooks hooks = Hooks::sensor_dynamics | Hooks::begin;
+
+    // y+ = w+ + of_y (y - w) + of_v v + of_step (w+ - w), and v+ likewise
+    template <class R>
+    struct Coefficients {
+        R of_y, of_v, of_step, slope_of_y, slope_of_v, slope_of_step;
+    };
+    template <class R>
+    struct State {
+        R output, slope, w;  // rad/s
+    };
+    static constexpr bool apart = true;
+    static constexpr Pace pace = Pace::fine;
+    static void prepare(const double* p, const PreparedFor& made, Coefficients<double>& c) {
+        const double a = p[0] * made.step, power = exp_of_minus(a), times = power > 0.0 ? a * power : 0.0;
+        const double mean = Decay(a).mean;
+        c = {power + times, times, power - 2.0 * mean, -times, power - times, mean - power};
+    }
+    template <class R>
+    static void begin(const Coefficients<R>&, State<R>& s, const Beginning<R>& start) {
+        s.output = s.w = start.velocity;
+    }
+
+    template <class R>
+    [[gnu::noinline]] static R sensor_dynamics(const Coefficients<R>& c, State<R>& s, R w_next) {
+        const R step = w_next - s.w, behind = s.output - s.w, slope = s.slope;
+        s.output = w_next + fma(c.of_step, step, fma(c.of_v, slope, c.of_y * behind));
+        s.slope = fma(c.slope_of_step, step, fma(c.slope_of_v, slope, c.slope_of_y * behind));
+        s.w = w_next;
+        return s.output;
+    }
+};
+
+}  // namespace gaident
