@@ -22,8 +22,23 @@ from .models import (
     simulate,
     simulate_many,
 )
+from .remedies import retune
 from .reporting import report
-from .results import Diagnosis, Estimate, Finding, Identification, InverseDynamics, Limits, Proposal, Settings, load
+from .results import (
+    Diagnosis,
+    Estimate,
+    Finding,
+    Identification,
+    InverseDynamics,
+    Limits,
+    LoopFigures,
+    Proposal,
+    Retuning,
+    RuleStart,
+    Settings,
+    Spread,
+    load,
+)
 from .show import progress
 
 __all__ = [
@@ -41,6 +56,7 @@ __all__ = [
     "InverseDynamics",
     "LeastSquares",
     "Limits",
+    "LoopFigures",
     "LowPass",
     "Model",
     "Notch",
@@ -48,9 +64,12 @@ __all__ = [
     "P",
     "Proposal",
     "Record",
+    "Retuning",
+    "RuleStart",
     "Run",
     "SearchSpace",
     "Settings",
+    "Spread",
     "TwoMass",
     "Winding",
     "WindingFit",
@@ -78,6 +97,7 @@ __all__ = [
     "read_columns",
     "read_pieces",
     "report",
+    "retune",
     "run",
     "simulate",
     "simulate_many",

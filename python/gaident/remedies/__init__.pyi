@@ -1,0 +1,5 @@
+from .retune import retune
+
+__all__ = [
+    "retune",
+]
