@@ -96,6 +96,7 @@ def measured(number: int, seed: int) -> dict[str, Any]:
         "doubts": len(tuned.doubts), "rule": tuned.rule, "keeps": tuned.keeps, "holds": tuned.holds,
         "stable": bool(new.stable[0]), "phase": float(new.phase_margins[0]), "gain": float(new.gain_margins[0]),
         "asked": [tuned.phase_margin, tuned.gain_margin, limit],
+        "before": [float(old.phase_margins[0]), float(old.gain_margins[0])],
         "stiffness": [float(old.stiffness[0]), float(new.stiffness[0])], "settling": [before[0], after[0]],
         "torque": [before[1], after[1]], "gains": [given.kp, given.ki, proposal.kp, proposal.ki],
         "seconds": [diagnosed - started, done - diagnosed],

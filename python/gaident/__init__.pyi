@@ -22,7 +22,7 @@ from .models import (
     simulate,
     simulate_many,
 )
-from .remedies import retune
+from .remedies import FeedforwardTables, Wave, feedforward, retune
 from .reporting import report
 from .results import (
     Diagnosis,
@@ -49,6 +49,7 @@ __all__ = [
     "Discrete",
     "Effect",
     "Estimate",
+    "FeedforwardTables",
     "Finding",
     "ForceError",
     "GaidentError",
@@ -71,6 +72,7 @@ __all__ = [
     "Settings",
     "Spread",
     "TwoMass",
+    "Wave",
     "Winding",
     "WindingFit",
     "align",
@@ -81,6 +83,7 @@ __all__ = [
     "errors",
     "estimate_winding",
     "factor_parameters",
+    "feedforward",
     "first_experiment",
     "force_error",
     "identify",

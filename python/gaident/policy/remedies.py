@@ -16,11 +16,14 @@ class RetunedGains:
     phase_margin: float = remedy(45.0, "deg", "of a proposed loop at least, where nobody asks for another: usual for servo axes")
     gain_margin: float = remedy(8.0, "dB", "the same: a factor of 2.5, by which an inertia or a torque constant may be wrong")
     robust_share: float = remedy(0.95, "1", "of the drives drawn from the covariance, in which the margins hold")
+    margin_room: float = remedy(
+        1.01, "1", "times the margins asked for, that the search keeps: a covariance is one to first order"
+    )
     most_sensitivity: float = remedy(
         2.0, "1", "largest sensitivity of a proposed loop (Astrom and Hagglund: 1.4 to 2), or what the margins asked for imply"
     )
     filter_pays: float = remedy(1.1, "1", "times the stiffness of the loop without it, from which on a filter is proposed")
-    position_peak: float = remedy(1.02, "1", "largest closed response of a position loop: its step then hardly overshoots")
+    position_overshoot: float = remedy(4.0, "%", "of a step of the position loop at most, without feedforward")
     swings_on: float = remedy(
         0.05, "1", "of the step of the command, by which the velocity still swings at rest: a limit cycle that is reported"
     )

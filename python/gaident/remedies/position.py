@@ -6,7 +6,7 @@ import numpy as np
 
 from gaident.control.cascade import Cascade
 from gaident.policy.table import POLICY
-from gaident.remedies.loops import Loops, position_frequencies
+from gaident.remedies.loops import Loops, Placed, overshoot, position_frequencies
 from gaident.remedies.margins import gain_margins, phase_margins
 from gaident.remedies.search import Asked, Search
 
@@ -21,11 +21,12 @@ def position_gain(search: Search, cascade: Cascade, asked: Asked) -> float | Non
     placed = loops.placed(cascade.position_every(search.plants.period))
     omega = position_frequencies(placed.period, POLICY.tuned_points)
     response = placed.response(omega)
-    best = None
+    kept = []
     for gain in 2.0 * np.pi * float(np.min(loops.bandwidths)) * GAINS:
         L = gain * response
-        kept = np.min(phase_margins(L)) >= asked.phase_margin and np.min(gain_margins(L)) >= asked.gain_margin
-        if not (kept and np.max(np.abs(L / (1.0 + L))) <= POLICY.position_peak and placed.stable(gain).all()):
+        margins = np.min(phase_margins(L)) >= asked.phase_margin and np.min(gain_margins(L)) >= asked.gain_margin
+        if not (margins and placed.stable(gain).all()):
             break
-        best = float(gain)
-    return best
+        kept.append(float(gain))
+    own = Placed(placed.A[:1], placed.B[:1], placed.period)
+    return next((gain for gain in reversed(kept) if overshoot(own.step(gain))[0] <= POLICY.position_overshoot), None)

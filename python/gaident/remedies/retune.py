@@ -134,13 +134,13 @@ def retune(
         )
     plants = sampled_plants(linear, period, given.delay, age > 0.0)
     work = _Retuning(
-        linear[0], cascade_of(given), period, age > 0.0, Search(plants.chosen(slice(0, POLICY.tuned_drives + 1)), asked)
+        linear[0], cascade_of(given), period, age > 0.0, Search(plants.chosen(slice(0, POLICY.tuned_drives + 1)), asked.roomier())
     )
     judge = Judge(
         plants, plants.responses(frequencies_of(plants, POLICY.checked_points, POLICY.checked_near)), asked.step, asked.noise
     )
     allowed = filters and isinstance(given, Cascade)
-    tuned, notes = work.best(asked, allowed)
+    tuned, notes = work.best(allowed)
     tuned = work.held(tuned, judge)
     proposal, more = work.placed(tuned.cascade)
     phase, gain = judge.margins(proposal)
@@ -192,7 +192,7 @@ class _Retuning:
         self.rules: Mapping[str, tuple[float, float]] = rules
         self.period = period
 
-    def best(self, asked: Asked, allowed: bool) -> tuple[Tuned, list[Text]]:
+    def best(self, allowed: bool) -> tuple[Tuned, list[Text]]:
         """The best loop, with filters where they pay, and what is to say of them."""
         plain = self.search.tuned(self.cascade, self.rules, ())
         best, words = plain, ""

@@ -56,6 +56,11 @@ class Asked:
         of_phase = 0.5 / math.sin(math.radians(0.5 * self.phase_margin))
         return float(max(POLICY.most_sensitivity, of_phase, factor / (factor - 1.0)))
 
+    def roomier(self) -> Asked:
+        """With the margins that the search keeps."""
+        room = POLICY.margin_room - 1.0
+        return self.stricter(room * self.phase_margin, room * self.gain_margin)
+
     def stricter(self, phase: float, gain: float) -> Asked:
         """With margins larger by so much [deg], [dB]."""
         return replace(self, phase_margin=self.phase_margin + phase, gain_margin=self.gain_margin + gain)
