@@ -22,7 +22,7 @@ from .models import (
     simulate,
     simulate_many,
 )
-from .remedies import FeedforwardTables, Wave, feedforward, retune
+from .remedies import ComparedModel, FeedforwardTables, ModelComparison, Wave, compare, feedforward, retune
 from .reporting import report
 from .results import (
     Diagnosis,
@@ -45,6 +45,7 @@ __all__ = [
     "PI",
     "Alignment",
     "Cascade",
+    "ComparedModel",
     "Diagnosis",
     "Discrete",
     "Effect",
@@ -60,6 +61,7 @@ __all__ = [
     "LoopFigures",
     "LowPass",
     "Model",
+    "ModelComparison",
     "Notch",
     "OneMass",
     "P",
@@ -77,6 +79,7 @@ __all__ = [
     "WindingFit",
     "align",
     "columns",
+    "compare",
     "diagnose",
     "differentiate",
     "effects",

@@ -21,7 +21,8 @@ from gaident.results.fitness import IN_SAMPLE, Comparison, Fitness
 from gaident.results.identification import Identification
 from gaident.results.inverse_dynamics import InverseDynamics
 from gaident.results.relevance import Relevance
-from gaident.results.saved import SavedResult, rows_of, undamaged
+from gaident.results.saved import rows_of, undamaged
+from gaident.results.what_if import WhatIf
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -33,7 +34,7 @@ SCHEMA_VERSION = 1  # no decision: a format: its version
 
 
 @dataclass(frozen=True, repr=False)
-class Diagnosis(SavedResult):
+class Diagnosis(WhatIf):
     """What the simulation gets wrong, why, and what the extended model gains. Made by `diagnose`.
 
     Attributes
