@@ -103,6 +103,8 @@ class _Step:
         command, velocity, torque = self.filters()
         r, w = through(command, r), through(velocity, w)
         error = r - w
+        if pi.ki == 0.0:  # a proportional controller has no integral, which would be a state that stays as it is
+            integral = 0.0
         integral = integral + pi.ki * self.period * (share * error + (1.0 - share) * before)
         u = through(torque, pi.kp * (pi.command_weight * r - w) + integral)
         return np.concatenate([*after, [integral, error]]), u

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
@@ -198,19 +199,35 @@ class _Retuning:
         best, words = plain, ""
         for added, name in self._filters():
             with_it = self.search.tuned(self.cascade, self.rules, added)
-            if with_it.excess == 0.0 and _pays(with_it, best, self.search):
-                best, words = with_it, name
+            if with_it.excess == 0.0 and _pays(with_it, best):
+                best, words = self._without_needless(with_it, len(added), name)
         if not words:
             return plain, []
-        more = _stiffness(best, self.search) / max(_stiffness(plain, self.search), 1e-300)
+        more = math.exp(best.worth - plain.worth)
+        if plain.excess > 0.0:
+            text = "These gains alone do not keep what was asked for, with {} in the path of the {torque} a loop does."
+            return (best, [say(text, words)]) if allowed else (plain, [say(text, words)])
         if allowed:
-            text = "{} in the {torque} was added: with it the loop is {:.2g} times as stiff as with the best gains alone."
+            text = (
+                "Added in the path of the {torque}: {}. The loop is {:.2g} times as stiff with it as with the best gains alone."
+            )
             return best, [say(text, words, more)]
         text = (
-            "{} in the {torque} would make the loop {:.2g} times as stiff as these gains alone. A PI has no filter: where the "
-            "drive can have one, give a Cascade around the PI as controller."
+            "With {} in the path of the {torque} the loop would be {:.2g} times as stiff as with these gains alone. A PI has no "
+            "filter: where the drive can have one, give a Cascade around the PI as controller."
         )
         return plain, [say(text, words, more)]
+
+    def _without_needless(self, tuned: Tuned, added: int, name: str) -> tuple[Tuned, str]:
+        """Without the first of two added filters, where the search from there does not need it."""
+        own = tuned.cascade
+        filters = tuple(own.torque_filters)
+        kept, last = filters[: len(filters) - added], filters[-1:]
+        if added == 1:
+            return tuned, name
+        rules = {tuned.rule: (own.velocity.kp, own.velocity.ki)}
+        less = self.search.tuned(replace(own, torque_filters=kept), rules, last)
+        return (tuned, name) if less.excess > 0.0 or _pays(tuned, less) else (less, "a notch")
 
     def _filters(self) -> list[tuple[tuple[Filter, ...], str]]:
         """Filters that may pay, in the order in which they are tried."""
@@ -218,9 +235,9 @@ class _Retuning:
         highest = HIGHEST_NOTCH / self.period
         low = LowPass(FASTEST * self.period)
         notches = [Notch(f, *NOTCH) for f in resonances(self.model) if f < highest][:1]
-        found: list[tuple[tuple[Filter, ...], str]] = [((low,), "A low pass")]
-        found += [((notch,), "A notch") for notch in notches]
-        found += [((low, notch), "A low pass and a notch") for notch in notches]
+        found: list[tuple[tuple[Filter, ...], str]] = [((low,), "a low pass")]
+        found += [((notch,), "a notch") for notch in notches]
+        found += [((low, notch), "a low pass and a notch") for notch in notches]
         return [(added, name) for added, name in found if len(added) <= room]
 
     def held(self, tuned: Tuned, judge: Judge) -> Tuned:
@@ -265,10 +282,8 @@ def _stiffness(tuned: Tuned, search: Search) -> float:
     return float(loops.stiffness[0]) if loops.stable.all() else 0.0
 
 
-def _pays(one: Tuned, other: Tuned, search: Search) -> bool:
-    if other.excess > 0.0:
-        return True
-    return _stiffness(one, search) >= POLICY.filter_pays * _stiffness(other, search)
+def _pays(one: Tuned, other: Tuned) -> bool:
+    return other.excess > 0.0 or one.worth >= other.worth + math.log(POLICY.filter_pays)
 
 
 def _of_the_covariance(drives: int, holds: float) -> list[Text]:

@@ -68,12 +68,17 @@ class Asked:
 
 @dataclass(frozen=True, eq=False)
 class Tuned:
-    """A controller that a search found; cost: lower is better; excess: how far it misses what was asked for, 0: not at all."""
+    """A controller that a search found.
+
+    cost: lower is better; excess: how far it misses what was asked for, 0: not at all; worth: ln of its stiffness, of a loop
+    without an integral ln kp.
+    """
 
     cascade: Cascade
     cost: float
     excess: float
     rule: str
+    worth: float = -math.inf
 
 
 @dataclass(frozen=True, eq=False)
@@ -107,7 +112,7 @@ class Search:
                 excess += max(0.0, math.log(max(torque / asked.torque_limit, 1e-300)))
             gains = cascade.velocity
             worth = math.log(max(float(loops.stiffness[0]), 1e-300)) if gains.ki > 0.0 else math.log(gains.kp)
-        return Tuned(cascade, PENALTY * excess - worth, excess, rule)
+        return Tuned(cascade, PENALTY * excess - worth, excess, rule, worth)
 
     def tuned(self, cascade: Cascade, rules: Mapping[str, tuple[float, float]], added: Sequence[Filter]) -> Tuned:
         """The best gains from the best of these rules, with filters of the torque added whose numbers are searched too."""

@@ -28,6 +28,7 @@ PIS = {
     "trapezoidal": ga.PI(0.02, 0.9),
     "backward": ga.PI(0.03, 1.2, rule="backward"),
     "forward": ga.PI(0.015, 0.5, rule="forward", command_weight=0.4),
+    "proportional": ga.PI(0.02, 0.0),
 }
 FILTERED = ga.Cascade(
     PIS["backward"],
@@ -54,6 +55,7 @@ def test_margins_are_those_of_python_control(drive: str, name: str) -> None:
     delayed = model.with_effect("transport_delay", delay=sum(delays) + cascade.delay)
     newest = {"trapezoidal": 0.5, "backward": 1.0, "forward": 0.0}[pi.rule]
     law = control.tf([pi.kp + newest * pi.ki * T, (1.0 - newest) * pi.ki * T - pi.kp], [1.0, -1.0], T)
+    law = law if pi.ki > 0.0 else control.tf([pi.kp], [1.0], T)
     for one in (*cascade.torque_filters, *cascade.velocity_filters):
         a = np.exp(-T / one.time_constant) if isinstance(one, ga.LowPass) else None
         if a is not None:
@@ -67,7 +69,7 @@ def test_margins_are_those_of_python_control(drive: str, name: str) -> None:
     answer = L(np.exp(1j * omega * T))
     _, phases, _, *_ = control.stability_margins(control.frd(answer, omega), returnall=True)
     assert loops.phase_margins[0] == pytest.approx(np.min(np.abs(phases), initial=np.inf), abs=0.05)
-    assert 1.0 / loops.peaks[0] == pytest.approx(np.min(np.abs(1.0 + answer)), rel=5e-3, abs=2e-3)
+    assert 1.0 / loops.peaks[0] == pytest.approx(np.min(np.abs(1.0 + answer)), rel=5e-3, abs=3e-3)
 
     def stable(factor: float) -> bool:
         return bool(np.max(np.abs(control.feedback(factor * L, 1).poles())) < 1.0)

@@ -85,8 +85,8 @@ def test_filters_are_added_to_a_cascade_where_they_pay(found: ga.Diagnosis, tune
     cascade = ga.retune(found, ga.Cascade(GIVEN), phase_margin=50.0, gain_margin=9.0)
     assert isinstance(cascade.controller, ga.Cascade)
     added = len(cascade.controller.torque_filters)
-    paid = any("added" in note for note in cascade.notes)
-    assert (added > 0) == paid == any("would make" in note for note in tuned.notes)
+    paid = any("Added" in note for note in cascade.notes)
+    assert (added > 0) == paid == any("would be" in note for note in tuned.notes)
     assert not paid or cascade.after.stiffness.value > 1.1 * tuned.after.stiffness.value
     phase, gain, stable = margins_of(LAGGED, cascade.controller)
     assert stable and phase >= 49.5 and gain >= 8.9
@@ -101,6 +101,14 @@ def test_the_gain_of_a_position_controller_is_proposed_too(found: ga.Diagnosis) 
     assert result.after.position_phase_margin is not None and result.after.position_phase_margin.low >= 44.0
     assert result.after.overshoot.value < 5.0 and result.after.settling_time.value < result.before.settling_time.value
     assert "position gain" in result.summary()
+
+
+def test_a_proportional_loop_stays_one(found: ga.Diagnosis) -> None:
+    result = ga.retune(found, ga.Cascade(ga.PI(0.02, 0.0), position=ga.P(5.0)), filters=False)
+    proposal = result.controller
+    assert isinstance(proposal, ga.Cascade) and proposal.position is not None
+    assert proposal.velocity.ki == 0.0 and proposal.velocity.kp > 0.02 and proposal.position.gain > 5.0 and result.keeps
+    assert result.after.stiffness.value > 2.0 * result.before.stiffness.value
 
 
 def test_a_falsified_model_is_said_so_first(found: ga.Diagnosis) -> None:
