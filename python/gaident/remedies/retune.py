@@ -27,7 +27,7 @@ from gaident.remedies.nonlinear import simulated_with, without_each
 from gaident.remedies.plants import sampled_plants
 from gaident.remedies.position import position_gain
 from gaident.remedies.rules import resonances, rule_gains
-from gaident.remedies.search import Asked, Search, Tuned
+from gaident.remedies.search import UNSTABLE, Asked, Search, Tuned
 from gaident.results.diagnosis import Diagnosis
 from gaident.results.identification import Identification
 from gaident.results.retuning import Retuning, RuleStart
@@ -36,6 +36,10 @@ from gaident.version import version
 __all__ = ["retune"]
 
 AS_GIVEN = "the given gains"
+NO_GAINS = (
+    "No gains were found with which every drive that the records leave possible is stable in the velocity loop: the given ones "
+    "stay. An axis on a spring, and one that hangs, have no integral of the velocity that comes to rest."
+)
 MOST_FILTERS = 8  # no decision: what an argument may be: filters of a cascade in one place
 HIGHEST_NOTCH = 0.45  # no decision: a start; of the sampling frequency
 NOTCH = (0.1, 0.6)  # no decision: a start; dampings of a notch
@@ -143,6 +147,8 @@ def retune(
     allowed = filters and isinstance(given, Cascade)
     tuned, notes = work.best(allowed)
     tuned = work.held(tuned, judge)
+    if tuned.excess >= UNSTABLE:
+        tuned, notes = replace(tuned, cascade=cascade_of(given), rule=AS_GIVEN), [say(NO_GAINS)]
     proposal, more = work.placed(tuned.cascade)
     phase, gain = judge.margins(proposal)
     holds = float(np.mean((phase >= asked.phase_margin) & (gain >= asked.gain_margin)))

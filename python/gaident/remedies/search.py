@@ -24,7 +24,7 @@ from gaident.policy.table import POLICY
 from gaident.remedies.loops import Loops, frequencies_of
 from gaident.remedies.plants import PlantResponses, Plants
 
-__all__ = ["Asked", "Search", "Tuned"]
+__all__ = ["UNSTABLE", "Asked", "Search", "Tuned"]
 
 Vector = NDArray[np.float64]
 

@@ -111,6 +111,13 @@ def test_a_proportional_loop_stays_one(found: ga.Diagnosis) -> None:
     assert result.after.stiffness.value > 2.0 * result.before.stiffness.value
 
 
+def test_where_no_gains_are_stable_the_given_ones_stay(found: ga.Diagnosis) -> None:
+    spring = ga.Model(2500.0, [-5.0 + 60.0j, -5.0 - 60.0j], [0.0])
+    result = ga.retune(replace(found, model=spring, covariance=None))
+    assert result.controller == GIVEN and not result.keeps and "stable" in result.missed
+    assert any("the given ones stay" in note for note in result.notes) and "NOT STABLE" in result.summary()
+
+
 def test_a_falsified_model_is_said_so_first(found: ga.Diagnosis) -> None:
     hidden = LAGGED.with_effect("coulomb_friction", torque=0.3)
     idn = ga.identify(log_of(hidden, GIVEN), controller=GIVEN)
