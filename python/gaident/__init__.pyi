@@ -22,7 +22,17 @@ from .models import (
     simulate,
     simulate_many,
 )
-from .remedies import ComparedModel, FeedforwardTables, ModelComparison, Wave, compare, feedforward, retune
+from .remedies import (
+    ComparedModel,
+    FeedforwardTables,
+    FrictionMap,
+    ModelComparison,
+    Wave,
+    compare,
+    feedforward,
+    friction_map,
+    retune,
+)
 from .reporting import report
 from .results import (
     Diagnosis,
@@ -53,6 +63,7 @@ __all__ = [
     "FeedforwardTables",
     "Finding",
     "ForceError",
+    "FrictionMap",
     "GaidentError",
     "Identification",
     "InverseDynamics",
@@ -89,6 +100,7 @@ __all__ = [
     "feedforward",
     "first_experiment",
     "force_error",
+    "friction_map",
     "identify",
     "initial_state",
     "inverse_dynamics",

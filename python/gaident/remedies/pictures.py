@@ -1,21 +1,41 @@
-"""A retuning as a picture: the velocity loop and its step, before and after."""
+"""Pictures: the velocity loop and its step before and after, and the friction of records."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from matplotlib.figure import Figure
+from numpy.typing import NDArray
 
-from gaident.axis import velocity_unit
+from gaident.axis import said, say, unit, velocity_unit
 from gaident.control.cascade import cascade_of
 from gaident.policy.table import POLICY
 from gaident.remedies.loops import Loops, frequencies_of
 from gaident.remedies.plants import sampled_plants
 from gaident.results.retuning import Retuning
 
-__all__ = ["plot_retuning"]
+__all__ = ["plot_friction", "plot_retuning"]
 
 COLOURS = {"before": "#888888", "after": "#1f77b4"}
 SHOWN = 1e-3  # no decision: drawn: lowest size of a loop
+
+
+def plot_friction(
+    velocity: NDArray[np.float64],
+    rows: Sequence[tuple[str, NDArray[np.float64], NDArray[np.float64]]],
+    axis: str,
+) -> Figure:
+    """Torque over the velocity, a line with the scatter of its bins for each record: (name, mean, scatter)."""
+    figure = Figure(figsize=(8.0, 5.0), layout="constrained")
+    ax = figure.subplots()
+    for name, mean, scatter in rows:
+        ax.errorbar(velocity, mean, scatter, marker=".", capsize=2.0, label=name)
+    ax.axhline(0.0, color="black", linewidth=0.5)
+    ax.set_xlabel(f"velocity [{velocity_unit(axis)}]")
+    ax.set_ylabel(said(say("{torque} without the inertia's"), axis) + f" [{unit('N m', axis)}]")
+    ax.legend()
+    return figure
 
 
 def plot_retuning(result: Retuning, axis: str = "rotary") -> Figure:
