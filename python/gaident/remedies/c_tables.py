@@ -48,7 +48,7 @@ class _Numbers(Protocol):
 
 TEXT = """\
 /* {title}, written by gaident.
-   {name}(velocity [{speed}], angle [{turn}], acceleration [{slope}]) is the {torque} to add [{unit}]. */
+   {name}(velocity [{speed}], angle [{turn}], acceleration [{slope}]) is the {what} to add [{unit}]. */
 #include <math.h>
 #include <stddef.h>
 
@@ -61,7 +61,7 @@ double {name}(double velocity, double angle, double acceleration);
 double {name}(double velocity, double angle, double acceleration)
 {{
     const double *w = {name}_velocity, *f = {name}_friction;
-    double torque = {constant} + {viscous} * velocity + {inertia} * acceleration;
+    double torque = {constant} + {viscous} * velocity + {of_slope} * acceleration;
     size_t i = 0;
     if (velocity <= w[0]) torque += f[0];
     else if (velocity >= w[{last}]) torque += f[{last}];
@@ -85,12 +85,12 @@ def c_tables(tables: _Numbers, name: str) -> str:
     friction = np.concatenate([tables.friction[:middle], [0.0], tables.friction[middle:]])
     waves = [f"{{{_list((w.order, w.sine, w.cosine))}}}" for w in tables.waves] or ["{0.0, 0.0, 0.0}"]
     return TEXT.format(
-        title=said(say("{Torque} of friction, load and inertia"), axis),
+        title=said(say("{Torque} of friction, load and {inertia}"), axis),
         name=name,
         speed=unit("rad/s", axis),
         turn=unit("rad", axis),
         slope=unit("rad/s^2", axis),
-        torque=said(say("{torque}"), axis),
+        what=said(say("{torque}"), axis),
         unit=unit("N m", axis),
         count=len(velocity),
         last=len(velocity) - 1,
@@ -101,7 +101,7 @@ def c_tables(tables: _Numbers, name: str) -> str:
         count_of_waves=len(tables.waves),
         constant=repr(float(tables.constant)),
         viscous=repr(float(tables.viscous)),
-        inertia=repr(float(tables.inertia)),
+        of_slope=repr(float(tables.inertia)),
     )
 
 

@@ -33,7 +33,7 @@ def plot_friction(
         ax.errorbar(velocity, mean, scatter, marker=".", capsize=2.0, label=name)
     ax.axhline(0.0, color="black", linewidth=0.5)
     ax.set_xlabel(f"velocity [{velocity_unit(axis)}]")
-    ax.set_ylabel(said(say("{torque} without the inertia's"), axis) + f" [{unit('N m', axis)}]")
+    ax.set_ylabel(said(say("{torque} without that of the {inertia}"), axis) + f" [{unit('N m', axis)}]")
     ax.legend()
     return figure
 
