@@ -26,6 +26,7 @@
     headers     names of columns, commas and letters of text logs (rows/headers.py)
     numbers     controllers with numbers that nobody gave (rows/numbers.py)
     pitches     linear axes whose force returns with a length that nobody gave (rows/pitches.py)
+    retuned     gains that are proposed for random drives, on the true ones (rows/retuned.py)
 
 A result has three parts: an outcome, what is said (verdict and findings; the structure; the terms), and a digest of the rest that
 a user reads: parameters to three digits, notes, comparisons, the next experiment.
@@ -59,6 +60,7 @@ from rows.pitches import pitch_seen, pitches
 from rows.profiles import interpolated, profiles
 from rows.proposals import kept, proposals
 from rows.responses import responses, shown_points
+from rows.retuned import gains_kept, retuned
 from rows.short_moves import described, short_moves
 from rows.slow_torques import ahead, measured_torques, named_ahead, named_sampled
 from rows.slower import EVERY, shown_slower, slower_forms
@@ -286,5 +288,6 @@ KINDS: dict[str, tuple[Callable[[int, int], list[Case]], Callable[[Case], Result
     "headers": (headers, header_read),
     "pitches": (pitches, pitch_seen),
     "numbers": (numbers, found_numbers),
+    "retuned": (retuned, gains_kept),
 }
 """Kind -> what makes its cases (count, seed), and what runs one."""

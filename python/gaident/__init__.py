@@ -45,6 +45,9 @@ provide(
         "regression_torque": "gaident.estimation.regression.prediction:regression_torque",
         "regression_error": "gaident.estimation.regression.prediction:regression_error",
         "inverse_dynamics_summary": "gaident.show.inverse_dynamics_summary:inverse_dynamics_summary",
+        # Retuning
+        "retuning_summary": "gaident.remedies.summary:retuning_summary",
+        "plot_retuning": "gaident.remedies.pictures:plot_retuning",
         # both
         "plot_bode": "gaident.reporting.figures:plot_bode",
     }

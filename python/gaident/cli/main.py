@@ -28,6 +28,8 @@ COMMANDS = {
     "simulate": "simulate:simulate_command",
     "report": "report:report_command",
     "export": "export:export_command",
+    "retune": "remedies:retune_command",
+    "feedforward": "remedies:feedforward_command",
     "effects": "effects:effects_command",
     "demo": "demo:demo_command",
     "reproduce": "reproduce:reproduce_command",

@@ -11,6 +11,14 @@ from typing import Any, NoReturn
 from gaident.axis import percent
 from gaident.cli.export_options import EXPORT_EXAMPLES, EXPORT_HELP, add_export_options
 from gaident.cli.log_options import add_log_commands, add_log_options, gain, number
+from gaident.cli.remedy_options import (
+    FEEDFORWARD_EXAMPLES,
+    FEEDFORWARD_HELP,
+    RETUNE_EXAMPLES,
+    RETUNE_HELP,
+    add_feedforward_options,
+    add_retune_options,
+)
 from gaident.cli.report_options import REPORT_EXAMPLES, REPORT_HELP, add_report_option, add_report_options
 from gaident.control.words import LOOPS
 from gaident.errors import SettingsError
@@ -215,6 +223,13 @@ def parser_of(commands: Mapping[str, str]) -> argparse.ArgumentParser:
 
     sub = command("export", "RESULT.json ", "saved result -> C, SciPy, python-control, CSV", EXPORT_HELP, EXPORT_EXAMPLES)
     add_export_options(sub)
+
+    sub = command("retune", "RESULT.json ", "saved result -> gains, the loop before and after", RETUNE_HELP, RETUNE_EXAMPLES)
+    add_retune_options(sub)
+
+    line = "saved diagnosis -> tables of friction, gravity, inertia"
+    sub = command("feedforward", "RESULT.json ", line, FEEDFORWARD_HELP, FEEDFORWARD_EXAMPLES)
+    add_feedforward_options(sub)
 
     sub = command("effects", "", "what a model can carry beyond its linear part", EFFECTS_HELP)
     sub.add_argument("--json", action="store_true", help="print JSON instead of a table")

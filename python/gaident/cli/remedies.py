@@ -24,6 +24,10 @@ SAME_NAME = {
         "load_side",
         "torque_is",
         "torque_log",
+        "phase_margin",
+        "gain_margin",
+        "torque_noise",
+        "speed",
     ),
 }
 _OTHER_NAME = {"start": "from", "stop": "to"}

@@ -61,7 +61,7 @@ from gaident.estimation.dataset import DataSet
 from gaident.estimation.found_numbers import covariance_of_numbers
 from gaident.estimation.objective import Fit, Objective
 from gaident.estimation.term import Term
-from gaident.estimation.uncertainty import estimates_of
+from gaident.estimation.uncertainty import estimates_of, model_covariance
 from gaident.identification.notes import open_loop_notes
 from gaident.models.model import Model
 from gaident.policy.table import POLICY
@@ -243,7 +243,7 @@ class Work:
                 self._take_shorter(attribution.of_known_size(self.found.space, self.final, unknown))
                 continue
             mechanics = mechanics_of(self.under, self.estimate)
-            model = with_effects(self.estimate.parameters.model(self.estimate.x), self.at_controller.effects)
+            model = self._made(self.estimate.x)
             check = by_second_method(self.data, gains, model, mechanics, estimates)
             causes, why = standing(causes, gains, check, self._equivalent_here)
             if why or check.loses:
@@ -256,6 +256,9 @@ class Work:
                 return Judged(gains, driver, causes, estimates, offset_of(self.found.space, self.final), mechanics, model, check)
             self.notes = said
             self.take(instead)
+
+    def _made(self, x: NDArray[np.float64]) -> Model:
+        return with_effects(self.estimate.parameters.model(x), self.at_controller.effects)
 
     def _spoiled(self) -> int:
         """Number of outliers of the log, and of samples that the model found does not follow."""
@@ -306,11 +309,12 @@ class Work:
             elsewhere = self.at_controller.effects
             proposal, notes = propose(ambiguous, self.rivals, self.final, self.data, self.objective.count, elsewhere)
             self.notes += notes
+        extended = bool(self.final.effects or self.at_controller.effects or self.data.slower)
         return Diagnosis(
             verdict=verdict,
             findings=tuple(findings),
             not_testable=self.not_testable,
-            model=model if self.final.effects or self.at_controller.effects or self.data.slower else self.idn.model,
+            model=model if extended else self.idn.model,
             before=check.before,
             after=check.after,
             driver=driver,
@@ -318,6 +322,7 @@ class Work:
             gain_interval=gains.interval,
             held_out=gains.held_out,
             base_shift=base_shift(self.base, self.estimate),
+            covariance=model_covariance(self.under, self.estimate, self._made) if extended else self.idn.covariance,
             left=self.left.gains,
             left_needed=self.left.needed,
             line=self.left.line if driver == "time" else None,
@@ -348,16 +353,8 @@ class Work:
     def _accepted_gains(self) -> Gains:
         """The gains, once every effect that makes held-out data worse is out of the model."""
         while True:
-            gains = measured_gains(
-                self.clean,
-                self.validation,
-                self.controller,
-                self._linear_of_part,
-                self.estimate,
-                self.under,
-                self.noise,
-                self.at_controller.effects,
-            )
+            given = self.clean, self.validation, self.controller, self._linear_of_part
+            gains = measured_gains(*given, self.estimate, self.under, self.noise, self.at_controller.effects)
             if not gains.harmful:
                 return gains
             effect = gains.harmful[-1]

@@ -13,20 +13,24 @@ On one gap under a coloured torque, whose impacts no model predicts, the error w
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
+from gaident.errors import ModelError
 from gaident.estimation.found_numbers import of_ages, of_numbers, variance_of
 from gaident.estimation.least_squares import fit as fitted
 from gaident.estimation.objective import Fit, Objective
 from gaident.estimation.projection import inverse_of
 from gaident.models.effects import row_of
+from gaident.models.factors import model_numbers
+from gaident.models.model import Model
 from gaident.policy.table import POLICY
 from gaident.results.estimate import Estimate
 
-__all__ = ["age_part", "controller_part", "covariance_of", "estimates_of"]
+__all__ = ["age_part", "controller_part", "covariance_of", "estimates_of", "model_covariance"]
 
 BLOCKS = 8  # no decision: how many parts of a jackknife
 
@@ -87,6 +91,33 @@ def _at_one_point(objective: Objective, fit: Fit) -> Matrix:
     if seen:
         cov[np.ix_(seen, seen)] = variance_of(objective, fit, v) * inverse_of(J[seen] @ J[seen].T)
     return cov
+
+
+def model_covariance(objective: Objective, fit: Fit, made: Callable[[Vector], Model]) -> tuple[tuple[float, ...], ...] | None:
+    """Covariance of the `model_numbers` of a fit, to first order; made: x -> model, with known settings beside.
+
+    None where the records leave a number open, and where a small step makes two real roots of a pair.
+    """
+    count = fit.parameters.size - sum(fit.parameters.starts)
+    cov = covariance_of(objective, fit)[:count, :count]
+    if not np.all(np.isfinite(cov)):
+        return None
+    found = model_numbers(made(fit.x))
+    # no decision: the step of a difference
+    h = 1e-6 * np.maximum(np.maximum(np.abs(fit.x[:count]), fit.parameters.steps()[:count]), 1e-6)
+    slopes = []
+    for i in range(count):
+        near = fit.x.copy()
+        near[i] += h[i]
+        try:
+            moved = model_numbers(made(near))
+        except ModelError:  # beyond a physical bound, at which it stands
+            return None
+        if len(moved) != len(found):
+            return None
+        slopes.append((moved - found) / h[i])
+    S = np.array(slopes)
+    return tuple(tuple(map(float, row)) for row in S.T @ cov @ S)
 
 
 def estimates_of(objective: Objective, fit: Fit) -> dict[str, dict[str, Estimate]]:

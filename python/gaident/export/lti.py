@@ -26,7 +26,7 @@ from gaident.models.effects_linear import LINEAR, Transfer
 from gaident.models.model import Model
 from gaident.models.roots import canonical_roots
 
-__all__ = ["to_control", "to_scipy"]
+__all__ = ["in_a_row", "to_control", "to_scipy"]
 
 Matrix = NDArray[np.float64]
 
@@ -114,7 +114,7 @@ def _sampled(chain: Transfer, dt: float) -> tuple[Matrix, Matrix, Matrix, Matrix
     """(A, B, C, D) at the sample time: the plant's states, then the torques u(k-1), u(k-2), ... on their way."""
     from scipy.linalg import expm
 
-    A, B, C = _cascade(chain, dt)
+    A, B, C = in_a_row(chain, dt)
     n = len(A)
 
     def over(share: float) -> tuple[Matrix, Matrix]:
@@ -147,7 +147,7 @@ def _sampled(chain: Transfer, dt: float) -> tuple[Matrix, Matrix, Matrix, Matrix
     return F, G, H, np.zeros((1, 1))
 
 
-def _cascade(chain: Transfer, dt: float) -> tuple[Matrix, NDArray[np.float64], NDArray[np.float64]]:
+def in_a_row(chain: Transfer, dt: float) -> tuple[Matrix, NDArray[np.float64], NDArray[np.float64]]:
     """(A, B, C) of the chain without its delay, time in units of dt, as sections of order two and one in a row.
 
     Each takes the output v of those before it:  x1' = x2, x2' = -e0 x1 - e1 x2 + v, y = n2 x2' + n1 x2 + n0 x1.

@@ -330,7 +330,8 @@ class _Work:
         at_bound = best.candidate.at_bound
         cov = covariance.covariance_of_factors(model, best.plain, best.coloured, best.noise.std, at_bound)
         parameters = covariance.estimates(model, cov, at_bound)
-        mechanics = mechanics_from_model(model, covariance.usable_covariance(model, cov))
+        usable = covariance.usable_covariance(model, cov)
+        mechanics = mechanics_from_model(model, usable)
         spread = _spread(self.records)
         s = self.settings
         lowest = min((c.bic for c in scored), default=0.0)
@@ -339,6 +340,7 @@ class _Work:
         close = [] if verdict.falsified or closer else scored
         close = [c for c in close if c.bic <= bic + POLICY.rival_margin and (c.p, c.q) != (model.p, model.q)]
         rivals = sorted((Rival(c.p, c.q, c.bic - bic, c.model) for c in close), key=lambda r: r.delta_bic)
+        notes = record_notes(self.records, self.controller, s.initial_state)
         states = {d: tuple(x.tolist()) for d, x in zip(self.digests, self.states(best.candidate), strict=True) if len(x)}
         return Identification(
             model=model,
@@ -352,15 +354,7 @@ class _Work:
             structures=tuple(Structure(c.p, c.q, c.cost, c.bic - lowest) for c in scored),
             trials=tuple(self.outcome(t) for t in found),
             adequacy=verdict,
-            warnings=warnings_of(
-                verdict,
-                parameters,
-                mechanics,
-                rivals,
-                model,
-                closer,
-                record_notes(self.records, self.controller, s.initial_state),
-            ),
+            warnings=warnings_of(verdict, parameters, mechanics, rivals, model, closer, notes),
             space=self.space,
             settings=s,
             seed=seed,
@@ -368,6 +362,7 @@ class _Work:
             samples=self.samples,
             digests=tuple(self.digests),
             initial_states=states,
+            covariance=None if usable is None else tuple(tuple(map(float, row)) for row in usable),
             version=version(),
             records=tuple(map(plain_of, self.records)),
         )

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from gaident.errors import ModelError
+from gaident.models.effect_rows import SIDES
 from gaident.models.model import Model
 from gaident.models.roots import quadratic_roots
 
@@ -150,6 +151,22 @@ def model_from_factor_parameters(values: ArrayLike, structure: FactorCounts) -> 
     poles = _roots(x[1:poles_end], structure.real_poles)
     zeros = _roots(x[poles_end:], structure.real_zeros)
     return Model(float(x[0]), poles, zeros)
+
+
+def model_numbers(model: Model) -> NDArray[np.float64]:
+    """The natural parameters of a model, then the parameters of each of its effects, in their order."""
+    return np.concatenate([factor_parameters(model)[1], *(np.array(effect.values) for effect in model.effects)])
+
+
+def model_of_numbers(values: NDArray[np.float64], like: Model) -> Model:
+    """The model with these `model_numbers`, and the structure and the effects of `like`; ModelError where none has them."""
+    structure = FactorCounts.of(like)
+    model, at = model_from_factor_parameters(values[: structure.size], structure), structure.size
+    for effect in like.effects:
+        parameters = dict(zip(effect.parameters, map(float, values[at : at + len(effect.values)]), strict=True))
+        model = model.with_effect(effect.name, side=effect.side or SIDES[0], **parameters)
+        at += len(effect.values)
+    return model
 
 
 def gain_unit(p: int) -> str:

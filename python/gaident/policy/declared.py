@@ -27,6 +27,7 @@ __all__ = [
     "REAL",
     "REGRESSION",
     "RESPONSES",
+    "RETUNED",
     "SAMPLED",
     "SHIFTED",
     "SHORT",
@@ -47,6 +48,7 @@ __all__ = [
     "noise",
     "reading",
     "record",
+    "remedy",
 ]
 
 CALIBRATED: dict[str, Any] = json.loads(Path(__file__).with_name("calibrated.json").read_text(encoding="utf-8"))
@@ -77,10 +79,11 @@ RESPONSES = "responses"
 HEADERS = "headers"
 PITCHES = "pitches"
 NUMBERS = "numbers"
+RETUNED = "retuned"
 SHOWN_BY = (
     *(DRIVES, SHORT, LOOP, SLOWER, SHIFTED, REAL, REGRESSION, SUCCESS, WINDING, FORMS, LOGS),
     *(ENCODER, PERIODS, PROFILES, AHEAD, SAMPLED, SHORT_MOVES, LAGS),
-    *(PROPOSALS, UNLOGGED, RESPONSES, HEADERS, PITCHES, NUMBERS),
+    *(PROPOSALS, UNLOGGED, RESPONSES, HEADERS, PITCHES, NUMBERS, RETUNED),
 )
 
 GAIN = "Is the gain enough?"
@@ -92,6 +95,7 @@ READING = "How is a log read?"
 RECORD = "What does a record show?"
 LINEAR = "Which linear model?"
 EXPERIMENTS = "What may an experiment ask of the axis?"
+REMEDIES = "Which gains are proposed?"
 EFFORT = "Effort"
 
 
@@ -141,6 +145,10 @@ def linear(value: float, unit: str, source: str, cases: str) -> Any:
 
 def experiment(value: float, unit: str, source: str) -> Any:
     return _row(EXPERIMENTS, value, unit, source, PROPOSALS)
+
+
+def remedy(value: float, unit: str, source: str) -> Any:
+    return _row(REMEDIES, value, unit, source, RETUNED)
 
 
 def effort(value: float, unit: str, source: str) -> Any:

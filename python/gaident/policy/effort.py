@@ -83,6 +83,16 @@ class Effort:
     pitch_parts: int = effort(6, "1", "of a pitch at most, of which the strongest wave of a force may be one")
     draws: int = effort(200, "1", "of the bootstrap of an interval")
 
+    tuned_drives: int = effort(24, "1", "drives drawn from the covariance, for which the gains of a loop are searched")
+    checked_drives: int = effort(200, "1", "the same, for which what was found is checked; their figures are told")
+    stepped_drives: int = effort(40, "1", "of these, whose answers to a step are simulated")
+    tuned_points: int = effort(160, "1", "frequencies of a loop in that search")
+    tuned_near: int = effort(31, "1", "of these near each resonance")
+    checked_points: int = effort(300, "1", "frequencies of the loop that is checked")
+    checked_near: int = effort(81, "1", "of these near each resonance")
+    tuning_steps: int = effort(120, "1", "loops that a search of gains tries for each of its starts")
+    step_samples: int = effort(1 << 14, "samples", "of a step's answer at most")
+
     # Samples that are looked at.
     spectrum_samples: int = effort(64, "samples", "of a record at least, in whose error's spectrum peaks are looked for")
     spectrum_mean: int = effort(31, "lines", "of that spectrum, whose running mean is the level that a peak stands above")

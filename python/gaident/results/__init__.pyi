@@ -8,6 +8,7 @@ from .frequency import FrequencyResponse, Responses
 from .identification import Identification
 from .inverse_dynamics import InverseDynamics
 from .relevance import Relevance
+from .retuning import LoopFigures, Retuning, RuleStart, Spread
 from .settings import Settings
 from .store import load, schema
 
@@ -22,10 +23,14 @@ __all__ = [
     "Identification",
     "InverseDynamics",
     "Limits",
+    "LoopFigures",
     "Proposal",
     "Relevance",
     "Responses",
+    "Retuning",
+    "RuleStart",
     "Settings",
+    "Spread",
     "load",
     "schema",
 ]

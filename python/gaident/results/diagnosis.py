@@ -21,7 +21,8 @@ from gaident.results.fitness import IN_SAMPLE, Comparison, Fitness
 from gaident.results.identification import Identification
 from gaident.results.inverse_dynamics import InverseDynamics
 from gaident.results.relevance import Relevance
-from gaident.results.saved import SavedResult, undamaged
+from gaident.results.saved import rows_of, undamaged
+from gaident.results.what_if import WhatIf
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -33,7 +34,7 @@ SCHEMA_VERSION = 1  # no decision: a format: its version
 
 
 @dataclass(frozen=True, repr=False)
-class Diagnosis(SavedResult):
+class Diagnosis(WhatIf):
     """What the simulation gets wrong, why, and what the extended model gains. Made by `diagnose`.
 
     Attributes
@@ -115,6 +116,8 @@ class Diagnosis(SavedResult):
         How large what is left is, and which mechanical values it can have bent; None in files of gaident 0.1.0.
     controller_numbers : mapping of str to Estimate
         What was None of the controller, as the logged torque shows it; names as "kp" or "torque_filters[0].frequency".
+    covariance : tuple of tuple of float, or None
+        That of the natural parameters of `model`, then of its effects' parameters, in SI; None where the records leave one open.
     axis : {"rotary", "linear"}
         Kind of the axis, as it was given to `diagnose`.
     records, validation_records : tuple of Record
@@ -166,6 +169,7 @@ class Diagnosis(SavedResult):
     axis: str = "rotary"
     controller_numbers: Mapping[str, Estimate] = field(default_factory=dict, hash=False)
     relevance: Relevance | None = None
+    covariance: tuple[tuple[float, ...], ...] | None = None
     records: tuple[Record, ...] = field(default=(), compare=False, repr=False)
     validation_records: tuple[Record, ...] = field(default=(), compare=False, repr=False)
 
@@ -316,16 +320,10 @@ class Diagnosis(SavedResult):
             "notes": list(self.notes),
             "identification": self.identification.to_dict(),
             "controller": None if self.controller is None else self.controller.to_dict(),
-            "seed": self.seed,
-            "seconds": self.seconds,
-            "simulations": self.simulations,
-            "samples": self.samples,
+            **{name: getattr(self, name) for name in ("seed", "seconds", "simulations", "samples")},
             "digests": list(self.digests),
             "validation_digests": list(self.validation_digests),
-            "noise": self.noise,
-            "bootstrap": self.bootstrap,
-            "torque_logged": self.torque_logged,
-            "loop_follows": self.loop_follows,
+            **{name: getattr(self, name) for name in ("noise", "bootstrap", "torque_logged", "loop_follows")},
             "line": None if self.line is None else list(self.line),
             "one_sided": dict(self.one_sided),
             "velocity_age": self.velocity_age,
@@ -339,6 +337,7 @@ class Diagnosis(SavedResult):
             "axis": self.axis,
             "relevance": None if self.relevance is None else self.relevance.to_dict(),
             "controller_numbers": {name: asdict(e) for name, e in self.controller_numbers.items()},
+            "covariance": None if self.covariance is None else [list(row) for row in self.covariance],
             "linear_axis": linear_sentences(self._sentences()),
         }
 
@@ -396,5 +395,6 @@ class Diagnosis(SavedResult):
                 left_needed=data.get("left_needed", 0.0),
                 axis=data.get("axis", "rotary"),
                 relevance=None if data.get("relevance") is None else Relevance.from_dict(data["relevance"]),
+                covariance=rows_of(data.get("covariance")),
                 controller_numbers={name: Estimate(**e) for name, e in data.get("controller_numbers", {}).items()},
             )

@@ -22,7 +22,7 @@ from gaident.models.starts import starts_moving
 from gaident.providers import picture, provided
 from gaident.results.adequacy import Adequacy
 from gaident.results.estimate import Estimate
-from gaident.results.saved import SavedResult, undamaged
+from gaident.results.saved import SavedResult, rows_of, undamaged
 from gaident.results.settings import Settings
 from gaident.results.structures import Rival, Structure, TrialOutcome
 
@@ -81,6 +81,9 @@ class Identification(SavedResult):
         Digest -> initial state of a record that did not start at rest.
     controller_numbers : mapping of str to Estimate
         What was None of the controller, as the logged torque shows it; names as "kp" or "torque_filters[0].frequency".
+    covariance : tuple of tuple of float, or None
+        Covariance of the natural parameters, in the order and units of `factor_parameters(model)`; None where the records leave
+        one open.
     version : str
         Version of gaident.
     records : tuple of Record
@@ -114,6 +117,7 @@ class Identification(SavedResult):
     initial_states: Mapping[str, tuple[float, ...]] = field(hash=False)
     version: str = ""
     controller_numbers: Mapping[str, Estimate] = field(default_factory=dict, hash=False)
+    covariance: tuple[tuple[float, ...], ...] | None = None
     records: tuple[Record, ...] = field(default=(), compare=False, repr=False)
 
     def __repr__(self) -> str:
@@ -291,6 +295,7 @@ class Identification(SavedResult):
             "digests": list(self.digests),
             "initial_states": {d: list(s) for d, s in self.initial_states.items()},
             "controller_numbers": {name: asdict(e) for name, e in self.controller_numbers.items()},
+            "covariance": None if self.covariance is None else [list(row) for row in self.covariance],
             "linear_axis": linear_sentences(self.warnings),
         }
 
@@ -326,4 +331,5 @@ class Identification(SavedResult):
                 initial_states={d: tuple(s) for d, s in data["initial_states"].items()},
                 version=data["gaident_version"],
                 controller_numbers={name: Estimate(**e) for name, e in data.get("controller_numbers", {}).items()},
+                covariance=rows_of(data.get("covariance")),
             )

@@ -7,6 +7,7 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
+from gaident.axis import unit
 from gaident.models.effects import row_of
 from gaident.results.estimate import Estimate, of_axis
 
@@ -64,6 +65,8 @@ def _on_linear(x: Any, sentences: Mapping[str, str], name: str, of_model: bool) 
             return x
         e = of_axis(name, Estimate(x["value"], x["std"], x["unit"]), "linear")
         return {**x, "value": e.value, "std": e.std, "unit": e.unit}
+    if {"value", "low", "high", "unit"} <= x.keys():
+        return {**x, "unit": unit(x["unit"], "linear")}
     known = {**sentences, **x.get("linear_axis", {})}
     if name == "effects" and {"name", "parameters"} <= x.keys():
         return {**x, **_effect_on_linear(x["name"], x["parameters"])}

@@ -13,7 +13,7 @@ from gaident.errors import GaidentError
 from gaident.files import write_whole
 from gaident.results.json_text import json_text
 
-__all__ = ["SavedResult", "undamaged"]
+__all__ = ["SavedResult", "rows_of", "undamaged"]
 
 
 class SavedResult(ABC):
@@ -48,6 +48,11 @@ class SavedResult(ABC):
         if not chosen:
             raise GaidentError(f"records: a loaded {self.KIND} contains no data; give {method}(records)")
         return chosen
+
+
+def rows_of(matrix: Sequence[Sequence[float]] | None) -> tuple[tuple[float, ...], ...] | None:
+    """A saved matrix; files of gaident 0.1.0 have none."""
+    return None if matrix is None else tuple(tuple(map(float, row)) for row in matrix)
 
 
 @contextmanager

@@ -17,21 +17,24 @@ from gaident.results.diagnosis import Diagnosis
 from gaident.results.identification import SCHEMA as IDENTIFICATION
 from gaident.results.identification import SCHEMA_VERSION, Identification
 from gaident.results.json_text import decoded
+from gaident.results.retuning import SCHEMA as RETUNING
+from gaident.results.retuning import Retuning
 from gaident.results.schema_check import check_saved
 
 __all__ = ["load", "schema"]
 
-Saved = Identification | Diagnosis | Record
+Saved = Identification | Diagnosis | Record | Retuning
 
 READERS: dict[str, Callable[[Mapping[str, Any]], Saved]] = {
     IDENTIFICATION: Identification.from_dict,
     DIAGNOSIS: Diagnosis.from_dict,
     RECORD: Record.from_dict,
+    RETUNING: Retuning.from_dict,
 }
 
 
 def load(path: str | os.PathLike[str]) -> Saved:
-    """Read what `Identification.save`, `Diagnosis.save` or `Record.save` wrote.
+    """Read what `Identification.save`, `Diagnosis.save`, `Retuning.save` or `Record.save` wrote.
 
     Parameters
     ----------
@@ -40,7 +43,7 @@ def load(path: str | os.PathLike[str]) -> Saved:
 
     Returns
     -------
-    Identification, Diagnosis or Record
+    Identification, Diagnosis, Retuning or Record
         What was saved; an identification and a diagnosis without their records.
 
     Raises
@@ -75,7 +78,9 @@ def load(path: str | os.PathLike[str]) -> Saved:
         raise GaidentError(f"{path}: is not JSON as save() writes it ({error}); give a file that save() wrote") from error
     reader = READERS.get(str(data.get("schema"))) if isinstance(data, dict) else None
     if reader is None:
-        raise GaidentError(f"{path}: contains no saved identification, diagnosis or record; give a file that save() wrote")
+        raise GaidentError(
+            f"{path}: contains no saved identification, diagnosis, retuning or record; give a file that save() wrote"
+        )
     try:
         check_schema(data, data["schema"], SCHEMA_VERSION)
         check_saved(data, schema())

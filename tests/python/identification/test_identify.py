@@ -262,7 +262,7 @@ def test_save_and_load(tmp_path: object) -> None:
     with pytest.raises(ga.GaidentError, match=r"result\.json: line"):
         ga.load(path)
     path.write_text('{"schema": "something else"}')
-    with pytest.raises(ga.GaidentError, match="contains no saved identification, diagnosis or record"):
+    with pytest.raises(ga.GaidentError, match="contains no saved identification, diagnosis, retuning or record"):
         ga.load(path)
     with pytest.raises(ga.GaidentError, match="nowhere"):
         ga.load(path.parent / "nowhere.json")

@@ -49,6 +49,7 @@ ROOMS = [
         "diagnosis/work",
         "diagnosis/diagnose",
     ),
+    "remedies",  # gains, and tables of feedforward, of what was found
     *("reporting", "paper", "drive", "cli", "cli/commands", "__init__", "__main__"),
 ]
 # What is still to be cut: modules that import each other.

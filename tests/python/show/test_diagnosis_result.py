@@ -424,7 +424,7 @@ def test_a_proposal_survives_the_file() -> None:
 @pytest.mark.parametrize(
     ("change", "words"),
     [
-        (lambda d: d.update(schema="something"), "contains no saved identification, diagnosis or record"),
+        (lambda d: d.update(schema="something"), "contains no saved identification, diagnosis, retuning or record"),
         (lambda d: d.update(schema_version=99), "schema_version is 99"),
         (lambda d: d.pop("findings"), "damaged"),
         (lambda d: d.update(before=3), "damaged"),

@@ -1,0 +1,74 @@
+"""Options and help of `gaident retune` and `gaident feedforward`."""
+
+from __future__ import annotations
+
+import argparse
+
+from gaident.axis import AXES
+from gaident.cli.log_options import number
+from gaident.policy.table import POLICY
+
+__all__ = [
+    "FEEDFORWARD_EXAMPLES",
+    "FEEDFORWARD_HELP",
+    "RETUNE_EXAMPLES",
+    "RETUNE_HELP",
+    "add_feedforward_options",
+    "add_retune_options",
+]
+
+RETUNE_HELP = """\
+Proposes gains for the drive of a saved diagnosis or identification: as stiff as margins, torque and the
+uncertainty of the model allow, and says what they change. Where the data contradict the model, the first line
+says so. A saved result has no samples: give the controller's sample time with --dt, and the step that the
+torque limit is meant for with --step.
+"""
+RETUNE_EXAMPLES = """\
+examples:
+  gaident diagnose run1.csv --drive drive.toml --out run.json
+  gaident retune run.json --dt 0.444e-3 --phase-margin 50 --torque-limit 2.4 --step 80 --plot loop.png
+  gaident retune run.json --dt 125e-6 --out gains.json
+"""
+FEEDFORWARD_HELP = """\
+Writes what a drive can add to the torque beforehand, from a saved diagnosis: friction by velocity in both
+directions, gravity and cogging by angle, and the inertia, as CSV or as one C99 file.
+"""
+FEEDFORWARD_EXAMPLES = """\
+examples:
+  gaident feedforward run.json --speed 80                    prints a summary
+  gaident feedforward run.json --speed 80 --csv axis.csv --c axis.c
+"""
+
+
+def add_retune_options(parser: argparse.ArgumentParser) -> None:
+    """What `gaident retune` takes."""
+    parser.add_argument("result", metavar="RESULT.json", help="what diagnose --out or identify --out saved")
+    g = parser.add_argument_group("what is asked for")
+    text = f"least phase margin [deg] (default {POLICY.phase_margin:g})"
+    g.add_argument("--phase-margin", type=number, default=POLICY.phase_margin, metavar="X", help=text)
+    text = f"least gain margin [dB] (default {POLICY.gain_margin:g})"
+    g.add_argument("--gain-margin", type=number, default=POLICY.gain_margin, metavar="X", help=text)
+    text = "largest torque of a step of the command [N m] (default: that of the controller)"
+    g.add_argument("--torque-limit", type=number, metavar="X", help=text)
+    g.add_argument("--torque-noise", type=number, metavar="X", help="largest rms of the torque that noise makes [N m]")
+    g.add_argument("--step", type=number, metavar="X", help="size of that step [rad/s] (default 1)")
+    g.add_argument("--dt", type=number, metavar="S", help="sample time of the controller [s]")
+    g.add_argument("--no-filters", action="store_true", help="add no low pass and no notch to a cascade")
+    g.add_argument("--seed", type=int, default=0, metavar="N", help="same seed, same result (default 0)")
+    g = parser.add_argument_group("results")
+    g.add_argument("--out", metavar="FILE", help="save the retuning (JSON)")
+    g.add_argument("--plot", metavar="FILE", help="draw the loop and its step before and after (.png, .pdf, .svg)")
+    g.add_argument("--axis", choices=AXES, help="words and units (default: those of the result)")
+    g.add_argument("--json", action="store_true", help="print what --out saves instead of the summary")
+
+
+def add_feedforward_options(parser: argparse.ArgumentParser) -> None:
+    """What `gaident feedforward` takes."""
+    parser.add_argument("result", metavar="RESULT.json", help="what diagnose --out saved")
+    parser.add_argument("--speed", type=number, required=True, metavar="X", help="highest speed of the table [rad/s]")
+    parser.add_argument("--points", type=int, metavar="N", help="speeds of each direction (default 32)")
+    parser.add_argument("--angles", type=int, metavar="N", help="angles of a turn (default 360)")
+    parser.add_argument("--csv", metavar="FILE", help="write all tables as CSV")
+    parser.add_argument("--c", metavar="FILE", help="write one C99 file with a function of the motion")
+    parser.add_argument("--axis", choices=AXES, help="words and units of what is printed (default: those of the result)")
+    parser.add_argument("--json", action="store_true", help="print the tables as JSON instead of the summary")

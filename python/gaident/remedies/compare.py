@@ -1,0 +1,168 @@
+"""compare(): several models of a drive against the same records."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gaident.axis import said, say, unit
+from gaident.control.controller import Controller, checked_controller
+from gaident.data.record import Record
+from gaident.errors import GaidentError, SettingsError
+from gaident.estimation.regression.force_error import force_error
+from gaident.models.mechanics import OneMass, TwoMass
+from gaident.models.model import Model
+from gaident.models.simulate import simulate
+from gaident.models.simulation_input import as_model
+from gaident.results.diagnosis import Diagnosis
+from gaident.results.identification import Identification
+from gaident.show.wording import number, table
+
+__all__ = ["ComparedModel", "ModelComparison", "compare"]
+
+Vector = NDArray[np.float64]
+Given = Model | OneMass | TwoMass | Identification | Diagnosis
+
+
+@dataclass(frozen=True)
+class ComparedModel:
+    """One model against the records.
+
+    Attributes
+    ----------
+    name : str
+        As it was given.
+    rmse : float
+        Root mean square of the velocity's error in the free run of all records [rad/s]; inf where it runs away.
+    fit_percent : float
+        100 (1 - norm(error)/norm(velocity - mean velocity)) of the same run [%].
+    largest : float
+        Largest error [rad/s].
+    force_error : float or None
+        Rms of the logged torque minus the torque that the model needs for the measured motion [N m]; None where no torque is
+        logged, or the model has no such torque.
+
+    See Also
+    --------
+    compare : Makes it.
+    """
+
+    name: str
+    rmse: float
+    fit_percent: float
+    largest: float
+    force_error: float | None
+
+
+@dataclass(frozen=True)
+class ModelComparison:
+    """Models against the same records, in the order in which they were given. Made by `compare`.
+
+    Attributes
+    ----------
+    models : tuple of ComparedModel
+        One for each model.
+
+    See Also
+    --------
+    compare : Makes it, with an example.
+    """
+
+    models: tuple[ComparedModel, ...]
+
+    @property
+    def best(self) -> ComparedModel:
+        """The model with the smallest error of the velocity."""
+        return min(self.models, key=lambda m: m.rmse)
+
+    def summary(self, axis: str = "rotary") -> str:
+        """Return a table of the models; `axis`: "linear" for units of m and N."""
+        v, u = unit("rad/s", axis), unit("N m", axis)
+        rows = [("model", f"rmse [{v}]", "fit [%]", f"largest error [{v}]", said(say("{torque} error"), axis) + f" [{u}]")]
+        for m in self.models:
+            force = "" if m.force_error is None else number(m.force_error)
+            rows.append((m.name, number(m.rmse), number(m.fit_percent), number(m.largest), force))
+        return "\n".join(table(rows))
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return plain data for JSON."""
+        return {"schema": "gaident/comparison", "schema_version": 1, "models": [asdict(m) for m in self.models]}
+
+
+def compare(
+    models: Mapping[str, Given] | Sequence[Given], rec: Record | Sequence[Record], controller: Controller | None = None
+) -> ModelComparison:
+    """Simulate several models on the same records, and say how far each is off.
+
+    Parameters
+    ----------
+    models : mapping of str to model, or sequence of models
+        Models, mechanisms, identifications or diagnoses, of which the model counts. A sequence gets the names "1", "2", ...
+    rec : Record or sequence of Record
+        The records. Each run starts from rest.
+    controller : PI or Cascade, optional
+        The loop that the command drives; None: the logged torque drives each model.
+
+    Returns
+    -------
+    ModelComparison
+        A row for each model.
+
+    Raises
+    ------
+    SettingsError
+        For something else than models or records.
+    RecordError
+        Where a record lacks what drives the models.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import gaident as ga
+    >>> drive = ga.OneMass(J=0.01, D=0.05).model().with_effect("coulomb_friction", torque=0.3)
+    >>> torque = np.repeat([0.8, -0.9, 0.5, -0.6], 100)
+    >>> run = ga.run(drive, ga.Record(1e-3, torque=torque, velocity=0.0 * torque))
+    >>> rec = ga.Record(1e-3, torque=torque, velocity=run.velocity)
+    >>> found = ga.compare({"as it is": drive, "mended": drive.without_effect("coulomb_friction")}, rec)
+    >>> found.best.name, found.models[0].rmse < 1e-9 < found.models[1].rmse
+    ('as it is', True)
+    """
+    checked_controller(controller)
+    named = dict(models) if isinstance(models, Mapping) else {str(i): m for i, m in enumerate(_listed(models), 1)}
+    records = (rec,) if isinstance(rec, Record) else rec
+    if not isinstance(records, Sequence) or not records or not all(isinstance(r, Record) for r in records):
+        raise SettingsError(f"rec is {type(rec).__name__}: give a gaident.Record or a list of them")
+    if not named:
+        raise SettingsError("models is empty: give one model at least")
+    measured = np.concatenate([r.velocity for r in records])
+    spread = float(np.linalg.norm(np.concatenate([r.velocity - np.mean(r.velocity) for r in records])))
+    return ModelComparison(tuple(_compared(str(n), m, records, controller, measured, spread) for n, m in named.items()))
+
+
+def _listed(models: object) -> Sequence[Given]:
+    if isinstance(models, str) or not isinstance(models, Sequence):
+        raise SettingsError(f"models is {type(models).__name__}: give a list of models, or a dictionary, name -> model")
+    return models
+
+
+def _compared(
+    name: str, given: Given, records: Sequence[Record], controller: Controller | None, measured: Vector, spread: float
+) -> ComparedModel:
+    model = given.model if isinstance(given, Identification | Diagnosis) else as_model(given)
+    with np.errstate(over="ignore", invalid="ignore"):
+        error = measured - np.concatenate([simulate(model, r, controller) for r in records])
+        size, largest = float(np.linalg.norm(error)), float(np.max(np.abs(error)))
+    if not np.isfinite(size):
+        return ComparedModel(name, float("inf"), float("-inf"), float("inf"), None)
+    force = None
+    if all(r.torque is not None for r in records):
+        try:
+            force = force_error(model, list(records)).rms
+        except GaidentError:  # the model has no torque of a motion, or nothing moves
+            force = None
+    fit = 100.0 * (1.0 - size / spread) if spread > 0.0 else float("nan")
+    return ComparedModel(name, size / float(np.sqrt(len(error))), fit, largest, force)

@@ -1,0 +1,72 @@
+"""Pictures: the velocity loop and its step before and after, and the friction of records."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+
+from gaident.axis import said, say, unit, velocity_unit
+from gaident.control.cascade import cascade_of
+from gaident.policy.table import POLICY
+from gaident.remedies.loops import Loops, frequencies_of
+from gaident.remedies.plants import sampled_plants
+from gaident.results.retuning import Retuning
+
+__all__ = ["plot_friction", "plot_retuning"]
+
+COLOURS = {"before": "#888888", "after": "#1f77b4"}
+SHOWN = 1e-3  # no decision: drawn: lowest size of a loop
+
+
+def plot_friction(
+    velocity: NDArray[np.float64],
+    rows: Sequence[tuple[str, NDArray[np.float64], NDArray[np.float64]]],
+    axis: str,
+) -> Figure:
+    """Torque over the velocity, a line with the scatter of its bins for each record: (name, mean, scatter)."""
+    figure = Figure(figsize=(8.0, 5.0), layout="constrained")
+    ax = figure.subplots()
+    for name, mean, scatter in rows:
+        ax.errorbar(velocity, mean, scatter, marker=".", capsize=2.0, label=name)
+    ax.axhline(0.0, color="black", linewidth=0.5)
+    ax.set_xlabel(f"velocity [{velocity_unit(axis)}]")
+    ax.set_ylabel(said(say("{torque} without that of the {inertia}"), axis) + f" [{unit('N m', axis)}]")
+    ax.legend()
+    return figure
+
+
+def plot_retuning(result: Retuning, axis: str = "rotary") -> Figure:
+    """Size and phase of the broken loop, and the answer to a unit step of the velocity command."""
+    figure = Figure(figsize=(8.0, 8.0), layout="constrained")
+    size, phase, answer = figure.subplots(3, 1)
+    for name, controller in (("before", result.given), ("after", result.controller)):
+        plants = sampled_plants([result.model.linear], result.period, controller.delay, result.velocity_age > 0.0)
+        loops = Loops(
+            plants, cascade_of(controller), plants.responses(frequencies_of(plants, POLICY.checked_points, POLICY.checked_near))
+        )
+        hertz, L = loops.responses.omega[0] / (2.0 * np.pi), loops.L[0]
+        seen = np.abs(L) > SHOWN
+        size.loglog(hertz[seen], np.abs(L[seen]), color=COLOURS[name], label=name)
+        phase.semilogx(hertz[seen], np.degrees(np.unwrap(np.angle(L[seen]))), color=COLOURS[name])
+        if loops.stable.all():
+            velocity, _, dt = loops.step()
+            answer.plot(dt * np.arange(velocity.shape[1]), velocity[0], color=COLOURS[name])
+    size.axhline(1.0, color="black", linewidth=0.5)
+    phase.axhline(-180.0, color="black", linewidth=0.5)
+    size.set_ylabel("size of the loop")
+    phase.set_ylabel("phase [deg]")
+    phase.set_xlabel("frequency [Hz]")
+    answer.set_ylabel(f"velocity [{velocity_unit(axis)}]")
+    answer.set_xlabel("time after a step of 1 [s]")
+    answer.set_xlim(0.0, _shown_time(result))
+    size.legend()
+    return figure
+
+
+def _shown_time(result: Retuning) -> float:
+    times = [f.settling_time.value for f in (result.before, result.after)]
+    known = [t for t in times if np.isfinite(t)]
+    return 2.0 * max(known, default=100.0 * result.period)

@@ -1,0 +1,371 @@
+"""retune(): gains of the velocity loop, and what they change, for a drive that was identified."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from gaident.arguments import arg
+from gaident.axis import Text, say
+from gaident.checks import real_number
+from gaident.control.cascade import Cascade, cascade_of
+from gaident.control.controller import Controller, checked_controller
+from gaident.control.filters import Filter, LowPass, Notch
+from gaident.control.pi import PI
+from gaident.errors import SettingsError
+from gaident.models.model import Model
+from gaident.policy.table import POLICY
+from gaident.remedies.doubts import doubts_of
+from gaident.remedies.draws import drawn_models
+from gaident.remedies.figures import Judge
+from gaident.remedies.loops import Loops, frequencies_of
+from gaident.remedies.nonlinear import simulated_with, without_each
+from gaident.remedies.plants import sampled_plants
+from gaident.remedies.position import position_gain
+from gaident.remedies.rules import resonances, rule_gains
+from gaident.remedies.search import UNSTABLE, Asked, Search, Tuned
+from gaident.results.diagnosis import Diagnosis
+from gaident.results.identification import Identification
+from gaident.results.retuning import Retuning, RuleStart
+from gaident.version import version
+
+__all__ = ["retune"]
+
+AS_GIVEN = "the given gains"
+NO_GAINS = (
+    "No gains were found with which every drive that the records leave possible is stable in the velocity loop: the given ones "
+    "stay. An axis on a spring, and one that hangs, have no integral of the velocity that comes to rest."
+)
+MOST_FILTERS = 8  # no decision: what an argument may be: filters of a cascade in one place
+HIGHEST_NOTCH = 0.45  # no decision: a start; of the sampling frequency
+NOTCH = (0.1, 0.6)  # no decision: a start; dampings of a notch
+FASTEST = 0.5  # no decision: a start; time constant of a low pass in samples
+UPPER = 90.0  # no decision: what an argument may be; deg
+DECIBELS = 40.0  # no decision: what an argument may be
+
+
+def retune(
+    result: Identification | Diagnosis,
+    controller: Controller | None = None,
+    *,
+    phase_margin: float = POLICY.phase_margin,
+    gain_margin: float = POLICY.gain_margin,
+    torque_limit: float | None = None,
+    torque_noise: float | None = None,
+    step: float | None = None,
+    dt: float | None = None,
+    filters: bool = True,
+    seed: int = 0,
+) -> Retuning:
+    """Propose gains for the drive of a result: as stiff as the margins, the torque and the uncertainty of the model allow.
+
+    The linear part of the model (delay, lag, filter and extra resonance included) is sampled exactly at the controller's clock.
+    The gains keep the margins in 95 % of the drives that the covariance of the result leaves possible.
+    From the best of the classical rules (symmetrical optimum, magnitude optimum, two masses equally damped, the given gains) a
+    search makes the loop as stiff as possible.
+    A low pass and a notch are added where they pay, to a Cascade; a PI stays one.
+    Where the model has nonlinear effects, the proposal is simulated with them, and the result says what was found.
+
+    Parameters
+    ----------
+    result : Identification or Diagnosis
+        What `identify` or `diagnose` found.
+    controller : PI or Cascade, optional
+        The controller to retune; None: that of the result.
+    phase_margin : float
+        Least phase margin of the velocity loop, and of the position loop where there is one [deg], above 0 and below 90.
+    gain_margin : float
+        Least gain margin [dB], above 0 and at most 40.
+    torque_limit : float, optional
+        Largest torque that a step of the velocity command of the size `step` may ask for [N m]; None: that of the controller,
+        or none where it has no limit.
+    torque_noise : float, optional
+        Largest rms of the torque that the noise of the velocity may make [N m]; None: any.
+    step : float, optional
+        Size of the step of the velocity command [rad/s]; None: the largest change between two lines of the records' command,
+        1 where there are none.
+    dt : float, optional
+        Sample time of the controller [s]; None: that of the controller, or of the records.
+    filters : bool
+        Whether a Cascade may get a low pass and a notch.
+    seed : int
+        Seed of the drives that are drawn; the same seed gives the same result.
+
+    Returns
+    -------
+    Retuning
+        The proposal, and the loop before and after.
+
+    Raises
+    ------
+    SettingsError
+        For arguments out of their range, and a result or controller that no loop can be made of.
+    ModelError
+        For a delay of very many samples.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import gaident as ga
+    >>> controller = ga.PI(kp=0.5, ki=5.0)
+    >>> command = np.repeat([20.0, -30.0, 10.0, -5.0], 100)
+    >>> noise = 0.02 * np.random.default_rng(1).standard_normal(400)
+    >>> drive = ga.OneMass(J=0.01, D=0.05).model().with_effect("torque_lag", time_constant=2e-3)
+    >>> run = ga.run(drive, ga.Record(1e-3, command=command - noise, velocity=noise), controller)
+    >>> rec = ga.Record(1e-3, command=command, velocity=run.velocity + noise, torque=run.torque)
+    >>> tuned = ga.retune(ga.diagnose(rec, controller, seed=1), phase_margin=50.0)
+    >>> tuned.keeps, tuned.after.stiffness.value > tuned.before.stiffness.value
+    (True, True)
+    """
+    given = _controller_of(result, controller)
+    period = _period_of(result, given, dt)
+    asked = _asked(result, given, phase_margin, gain_margin, torque_limit, torque_noise, step)
+    if not isinstance(filters, bool):
+        raise SettingsError(f"filters is {filters!r}: give True or False")
+    if isinstance(seed, bool) or not isinstance(seed, int) or seed < 0:
+        raise SettingsError(f"seed is {seed!r}: give a whole number >= 0")
+    age = result.velocity_age if isinstance(result, Diagnosis) else 0.0
+    axis = result.axis if isinstance(result, Diagnosis) else "rotary"
+    drawn = drawn_models(result, POLICY.checked_drives, seed)
+    linear = [model.linear for model in drawn]
+    if linear[0].gain < 0.0 or linear[0].p < 1:
+        raise SettingsError(
+            f"the model of the result has gain {linear[0].gain:g} and p = {linear[0].p}: gains are proposed for a drive that a "
+            "positive torque turns forwards, with more poles than zeros; change the sign of the torque, or identify again"
+        )
+    plants = sampled_plants(linear, period, given.delay, age > 0.0)
+    work = _Retuning(
+        linear[0], cascade_of(given), period, age > 0.0, Search(plants.chosen(slice(0, POLICY.tuned_drives + 1)), asked.roomier())
+    )
+    judge = Judge(
+        plants, plants.responses(frequencies_of(plants, POLICY.checked_points, POLICY.checked_near)), asked.step, asked.noise
+    )
+    allowed = filters and isinstance(given, Cascade)
+    tuned, notes = work.best(allowed)
+    tuned = work.held(tuned, judge)
+    if tuned.excess >= UNSTABLE:
+        tuned, notes = replace(tuned, cascade=cascade_of(given), rule=AS_GIVEN), [say(NO_GAINS)]
+    proposal, more = work.placed(tuned.cascade)
+    phase, gain = judge.margins(proposal)
+    holds = float(np.mean((phase >= asked.phase_margin) & (gain >= asked.gain_margin)))
+    found: Controller = proposal
+    if isinstance(given, PI):
+        found = replace(given, kp=proposal.velocity.kp, ki=proposal.velocity.ki)
+    after = judge.figures(proposal)
+    told = simulated_with(result.model, given, found, period, asked.step, after)
+    return Retuning(
+        controller=found,
+        given=given,
+        before=judge.figures(cascade_of(given)),
+        after=after,
+        doubts=doubts_of(result),
+        phase_margin=asked.phase_margin,
+        gain_margin=asked.gain_margin,
+        torque_limit=asked.torque_limit,
+        step=asked.step,
+        holds=holds,
+        drives=len(drawn) - 1,
+        rule=tuned.rule,
+        starts=work.starts(),
+        simulated=told,
+        mended=without_each(result.model, found, period, asked.step, after),
+        notes=(*notes, *more, *_of_the_covariance(len(drawn) - 1, holds)),
+        model=result.model,
+        period=period,
+        velocity_age=age,
+        noise=asked.noise,
+        seed=seed,
+        axis=axis,
+        digests=result.digests,
+        version=version(),
+    )
+
+
+class _Retuning:
+    """The work on one loop."""
+
+    def __init__(self, model: Model, cascade: Cascade, period: float, differenced: bool, search: Search) -> None:
+        self.model, self.cascade, self.search = model, cascade, search
+        self.asked = search.asked
+        pi = cascade.velocity
+        rules = rule_gains(model, cascade, period, differenced)
+        rules = {name: (kp, ki if pi.ki > 0.0 else 0.0) for name, (kp, ki) in rules.items() if ki > 0.0 or pi.ki == 0.0}
+        if pi.kp > 0.0:
+            rules[AS_GIVEN] = (pi.kp, pi.ki)
+        self.rules: Mapping[str, tuple[float, float]] = rules
+        self.period = period
+
+    def best(self, allowed: bool) -> tuple[Tuned, list[Text]]:
+        """The best loop, with filters where they pay, and what is to say of them."""
+        plain = self.search.tuned(self.cascade, self.rules, ())
+        best, words = plain, ""
+        for added, name in self._filters():
+            with_it = self.search.tuned(self.cascade, self.rules, added)
+            if with_it.excess == 0.0 and _pays(with_it, best):
+                best, words = self._without_needless(with_it, len(added), name)
+        if not words:
+            return plain, []
+        more = math.exp(best.worth - plain.worth)
+        if plain.excess > 0.0:
+            text = "These gains alone do not keep what was asked for, with {} in the path of the {torque} a loop does."
+            return (best, [say(text, words)]) if allowed else (plain, [say(text, words)])
+        if allowed:
+            text = (
+                "Added in the path of the {torque}: {}. The loop is {:.2g} times as stiff with it as with the best gains alone."
+            )
+            return best, [say(text, words, more)]
+        text = (
+            "With {} in the path of the {torque} the loop would be {:.2g} times as stiff as with these gains alone. A PI has no "
+            "filter: where the drive can have one, give a Cascade around the PI as controller."
+        )
+        return plain, [say(text, words, more)]
+
+    def _without_needless(self, tuned: Tuned, added: int, name: str) -> tuple[Tuned, str]:
+        """Without the first of two added filters, where the search from there does not need it."""
+        own = tuned.cascade
+        filters = tuple(own.torque_filters)
+        kept, last = filters[: len(filters) - added], filters[-1:]
+        if added == 1:
+            return tuned, name
+        rules = {tuned.rule: (own.velocity.kp, own.velocity.ki)}
+        less = self.search.tuned(replace(own, torque_filters=kept), rules, last)
+        return (tuned, name) if less.excess > 0.0 or _pays(tuned, less) else (less, "a notch")
+
+    def _filters(self) -> list[tuple[tuple[Filter, ...], str]]:
+        """Filters that may pay, in the order in which they are tried."""
+        room = MOST_FILTERS - len(self.cascade.torque_filters)
+        highest = HIGHEST_NOTCH / self.period
+        low = LowPass(FASTEST * self.period)
+        notches = [Notch(f, *NOTCH) for f in resonances(self.model) if f < highest][:1]
+        found: list[tuple[tuple[Filter, ...], str]] = [((low,), "a low pass")]
+        found += [((notch,), "a notch") for notch in notches]
+        found += [((low, notch), "a low pass and a notch") for notch in notches]
+        return [(added, name) for added, name in found if len(added) <= room]
+
+    def held(self, tuned: Tuned, judge: Judge) -> Tuned:
+        """Searched again with larger margins, while too few of all drives keep those that were asked for."""
+        search, own = self.search, tuned.cascade
+        added = len(own.torque_filters) - len(self.cascade.torque_filters)
+        for _ in range(POLICY.rounds):
+            phase, gain = judge.margins(own)
+            asked = self.asked
+            if np.mean((phase >= asked.phase_margin) & (gain >= asked.gain_margin)) >= POLICY.robust_share:
+                break
+            low = 50.0 * (1.0 - POLICY.robust_share)  # half of those that may miss it
+            lacks = [max(0.0, wanted - float(np.percentile(m, low))) for m, wanted in
+                     ((phase, asked.phase_margin), (gain, asked.gain_margin))]  # fmt: skip
+            search = Search(search.plants, search.asked.stricter(*lacks))
+            rules = {tuned.rule: (own.velocity.kp, own.velocity.ki)}
+            tuned = search.tuned(replace(own, torque_filters=own.torque_filters[: len(own.torque_filters) - added]), rules,
+                                   own.torque_filters[len(own.torque_filters) - added :])  # fmt: skip
+            own = tuned.cascade
+        return tuned
+
+    def placed(self, cascade: Cascade) -> tuple[Cascade, list[Text]]:
+        """With the gain of the position controller, where there is one."""
+        if cascade.position is None:
+            return cascade, []
+        gain = position_gain(self.search, cascade, self.asked)
+        if gain is None:
+            return cascade, [say("No gain of the position controller keeps what was asked for: the given one stays.")]
+        return replace(cascade, position=replace(cascade.position, gain=gain)), []
+
+    def starts(self) -> tuple[RuleStart, ...]:
+        """The rules as they are."""
+        found = []
+        for name, (kp, ki) in self.rules.items():
+            one = self.search.judged(replace(self.cascade, velocity=replace(self.cascade.velocity, kp=kp, ki=ki)), name)
+            found.append(RuleStart(name, kp, ki, one.excess == 0.0, _stiffness(one, self.search)))
+        return tuple(found)
+
+
+def _stiffness(tuned: Tuned, search: Search) -> float:
+    loops = Loops(search.plants, tuned.cascade, search.responses)
+    return float(loops.stiffness[0]) if loops.stable.all() else 0.0
+
+
+def _pays(one: Tuned, other: Tuned) -> bool:
+    return other.excess > 0.0 or one.worth >= other.worth + math.log(POLICY.filter_pays)
+
+
+def _of_the_covariance(drives: int, holds: float) -> list[Text]:
+    if drives == 0:
+        return [say("The records leave a number of the model open, or the result is an old one: nothing is known of its spread.")]
+    if holds < POLICY.robust_share:
+        text = "Only in {:.0f} % of {} drives that the records leave possible does this loop keep the margins."
+        return [say(text, 100.0 * holds, drives)]
+    return []
+
+
+def _controller_of(result: object, controller: Controller | None) -> Controller:
+    if not isinstance(result, Identification | Diagnosis):
+        raise SettingsError(f"result is {type(result).__name__}: give what gaident.identify or gaident.diagnose found")
+    given = checked_controller(controller) or result.controller
+    if given is None:
+        raise SettingsError(f"the result has no controller, and none is given: give {arg('controller', 'PI(...)')}")
+    if given.loop != "sampled":
+        raise SettingsError(
+            "the controller has the continuous loop of the paper: gains are proposed for a digital controller; give "
+            f"{arg('controller', 'PI(kp, ki)')}"
+        )
+    if given.unknown:
+        raise SettingsError(f"controller has {given.unknown[0]}=None: give a number, or a result that found one")
+    return given
+
+
+def _period_of(result: Identification | Diagnosis, given: Controller, dt: float | None) -> float:
+    if dt is not None:
+        period = real_number(dt, "dt", SettingsError, "give the sample time of the controller in s, > 0")
+        if period <= 0.0:
+            raise SettingsError(f"dt is {period:g}: give the sample time of the controller in s, > 0")
+        return period
+    if given.clock is not None:
+        return given.clock
+    if result.records:
+        return result.records[0].dt
+    raise SettingsError(f"the sample time of the controller is not known: a loaded result has no records; give {arg('dt')} [s]")
+
+
+def _asked(
+    result: Identification | Diagnosis,
+    given: Controller,
+    phase: float,
+    gain: float,
+    torque: float | None,
+    torque_noise: float | None,
+    step: float | None,
+) -> Asked:
+    own = None if np.isinf(given.limits[0]) else given.limits[0]
+    numbers: dict[str, Any] = {}
+    for name, value, highest, unit in (("phase_margin", phase, UPPER, "deg"), ("gain_margin", gain, DECIBELS, "dB")):
+        numbers[name] = real_number(value, name, SettingsError, f"give a number in {unit}, > 0")
+        if not 0.0 < numbers[name] < highest:
+            raise SettingsError(f"{name} is {numbers[name]:g}: give a number in {unit}, above 0 and below {highest:g}")
+    for name, more in (("torque_limit", torque), ("torque_noise", torque_noise), ("step", step)):
+        if more is not None:
+            numbers[name] = real_number(more, name, SettingsError, "give a number > 0")
+            if numbers[name] <= 0.0:
+                raise SettingsError(f"{name} is {numbers[name]:g}: give a number > 0, or leave it out")
+    return Asked(
+        numbers["phase_margin"],
+        numbers["gain_margin"],
+        numbers.get("torque_limit", own),
+        numbers["step"] if "step" in numbers else _step_of(result),
+        numbers.get("torque_noise"),
+        _noise_of(result),
+    )
+
+
+def _step_of(result: Identification | Diagnosis) -> float:
+    jumps = [float(np.max(np.abs(np.diff(r.command, prepend=0.0)))) for r in result.records if r.command is not None]
+    return max(jumps, default=0.0) or 1.0
+
+
+def _noise_of(result: Identification | Diagnosis) -> float:
+    if isinstance(result, Diagnosis):
+        return result.after.noise_floor if result.noise is None else result.noise
+    return result.adequacy.noise_std

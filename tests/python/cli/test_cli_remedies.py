@@ -1,0 +1,71 @@
+"""gaident retune and gaident feedforward: what they print and write is what the package says."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import gaident as ga
+from gaident.cli import main
+
+
+@pytest.fixture(scope="module")
+def result() -> ga.Diagnosis:
+    controller = ga.PI(0.5, 5.0)
+    command = np.repeat([20.0, -30.0, 10.0, -5.0], 100)
+    noise = 0.02 * np.random.default_rng(1).standard_normal(400)
+    drive = ga.OneMass(J=0.01, D=0.05).model().with_effect("coulomb_friction", torque=0.3)
+    run = ga.run(drive, ga.Record(1e-3, command=command - noise, velocity=noise), controller)
+    rec = ga.Record(1e-3, command=command, velocity=run.velocity + noise, torque=run.torque)
+    return ga.diagnose(rec, controller, seed=1)
+
+
+@pytest.fixture
+def here(result: ga.Diagnosis, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.chdir(tmp_path)
+    result.save("run.json")
+    result.identification.save("idn.json")
+    result.records[0].save("rec.json")
+    return tmp_path
+
+
+def test_retune_prints_and_saves(here: Path, result: ga.Diagnosis, capsys: pytest.CaptureFixture[str]) -> None:
+    options = ["run.json", "--dt", "1e-3", "--step", "50", "--phase-margin", "55", "--torque-limit", "60"]
+    assert main(["retune", *options, "--out", "gains.json", "--plot", "loop.png"]) == 0
+    printed = capsys.readouterr().out
+    tuned = ga.load("gains.json")
+    assert isinstance(tuned, ga.Retuning) and tuned.phase_margin == 55.0 and tuned.after.step_torque.value <= 60.0
+    assert tuned == ga.retune(result, phase_margin=55.0, torque_limit=60.0, step=50.0, dt=1e-3)
+    assert printed == f"{tuned.summary()}\nwritten: gains.json\nwritten: loop.png\n" and Path("loop.png").stat().st_size > 1000
+    assert main(["retune", *options, "--json", "--axis", "linear"]) == 0
+    data = json.loads(capsys.readouterr().out)
+    assert data["schema"] == "gaident/retuning" and data["after"]["stiffness"]["unit"] == "N/m"
+
+
+def test_feedforward_prints_and_writes(here: Path, result: ga.Diagnosis, capsys: pytest.CaptureFixture[str]) -> None:
+    tables = ga.feedforward(result, speed=30.0, points=8)
+    assert main(["feedforward", "run.json", "--speed", "30", "--points", "8", "--csv", "t.csv", "--c", "t.c"]) == 0
+    assert capsys.readouterr().out == f"{tables.summary()}\nwritten: t.csv\nwritten: t.c\n"
+    assert Path("t.c").read_text() == tables.to_c(None, "t")
+    assert len(Path("t.csv").read_text().splitlines()) == 1 + 3 + 16
+    assert main(["feedforward", "run.json", "--speed", "30", "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["schema"] == "gaident/feedforward"
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [(["retune", "run.json"], "give --dt [s]"), (["retune", "rec.json", "--dt", "1e-3"], "rec.json contains no model"),
+     (["retune", "run.json", "--dt", "1e-3", "--phase-margin", "100"], "phase_margin is 100"),
+     (["retune", "run.json", "--dt", "1e-3", "--plot", "loop.txt"], "a picture ends in"),
+     (["retune", "run.json", "--out", "run.json"], "this is the log itself"),
+     (["feedforward", "idn.json", "--speed", "3"], "idn.json contains no diagnosis"),
+     (["feedforward", "run.json", "--speed", "3", "--csv", "a", "--c", "a"], "both name a"),
+     (["feedforward", "run.json"], "--speed")],
+)  # fmt: skip
+def test_wrong_use_is_one_line(here: Path, arguments: list[str], message: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(arguments) == 2
+    said = capsys.readouterr().err
+    assert message in said and said.count("\n") == 1

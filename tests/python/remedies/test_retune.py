@@ -1,0 +1,184 @@
+"""retune(): what it proposes, of whom, and what it says where the model is not to be trusted."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import gaident as ga
+from gaident.axis import said
+from gaident.remedies.doubts import doubts_of
+from gaident.remedies.draws import drawn_models
+from gaident.remedies.loops import Loops, frequencies_of
+from gaident.remedies.nonlinear import simulated_with, without_each
+from gaident.remedies.plants import sampled_plants
+from gaident.results.json_text import json_text
+from gaident.results.store import schema
+
+T = 1e-3
+LAGGED = ga.TwoMass(JM=2e-4, DM=1e-3, JL=4e-4, DL=1e-3, KG=40.0, DG=4e-3).model().with_effect("torque_lag", time_constant=1e-3)
+GIVEN = ga.PI(0.02, 0.5)
+
+
+def log_of(model: ga.Model, controller: Any, seed: int = 1, noise: float = 0.05) -> ga.Record:
+    """Steps with reversals, with noise that the controller reads."""
+    rng = np.random.default_rng(seed)
+    command = np.repeat(rng.permutation([20.0, -30.0, 10.0, -5.0, 40.0, -20.0, 3.0, 0.0]), 150)
+    v = noise * rng.standard_normal(len(command))
+    run = ga.run(model, ga.Record(T, command=command - v, velocity=v), controller)
+    return ga.Record(T, command=command, velocity=run.velocity + v, torque=run.torque)
+
+
+@pytest.fixture(scope="module")
+def found() -> ga.Diagnosis:
+    return ga.diagnose(log_of(LAGGED, GIVEN), GIVEN, seed=1)
+
+
+@pytest.fixture(scope="module")
+def tuned(found: ga.Diagnosis) -> ga.Retuning:
+    return ga.retune(found, phase_margin=50.0, gain_margin=9.0)
+
+
+def margins_of(model: ga.Model, cascade: ga.Cascade) -> tuple[float, float, bool]:
+    plants = sampled_plants([model.linear], T, cascade.delay, False)
+    loops = Loops(plants, cascade, plants.responses(frequencies_of(plants, 600, 81)))
+    return float(loops.phase_margins[0]), float(loops.gain_margins[0]), bool(loops.stable[0])
+
+
+def test_the_true_drive_keeps_the_margins_and_is_stiffer(tuned: ga.Retuning) -> None:
+    assert isinstance(tuned.controller, ga.PI) and tuned.controller != GIVEN and tuned.given == GIVEN
+    phase, gain, stable = margins_of(LAGGED, ga.Cascade(tuned.controller))
+    assert stable and phase >= 49.5 and gain >= 8.9
+    assert tuned.keeps and tuned.missed == () and tuned.holds >= 0.95 and tuned.drives == 200 and not tuned.doubts
+    assert tuned.after.stiffness.value > 1.5 * tuned.before.stiffness.value
+    assert tuned.after.phase_margin.low <= tuned.after.phase_margin.value <= tuned.after.phase_margin.high
+    assert {s.name for s in tuned.starts} >= {"symmetrical optimum", "magnitude optimum", "two masses, equally damped"}
+    assert tuned.rule in {s.name for s in tuned.starts}
+
+
+def test_the_covariance_is_that_of_the_numbers(found: ga.Diagnosis) -> None:
+    models = drawn_models(found, 300, seed=3)
+    assert len(models) == 301 and models[0] == found.model
+    lags = [m.effects[0].values[0] for m in models[1:]]
+    lag = found.findings[0].parameters["time_constant"]
+    assert found.findings[0].effect == "torque_lag"
+    assert float(np.std(lags)) == pytest.approx(lag.std, rel=0.15) and float(np.mean(lags)) == pytest.approx(lag.value, rel=0.01)
+    inertias = [1.0 / m.gain for m in models[1:]]
+    assert float(np.std(inertias)) == pytest.approx(found.mechanics["motor_inertia"].std, rel=0.5)
+    assert drawn_models(replace(found, covariance=None), 10, seed=0) == [found.model]
+
+
+def test_a_step_asks_for_no_more_torque_than_allowed(found: ga.Diagnosis, tuned: ga.Retuning) -> None:
+    free = tuned.after.step_torque.value
+    limited = ga.retune(found, ga.PI(0.02, 0.5, torque_limit=0.6 * free))
+    assert limited.torque_limit == 0.6 * free and limited.controller.limits[0] == 0.6 * free
+    assert limited.after.step_torque.value <= 0.6 * free and limited.keeps
+    assert limited.controller.gains.kp < tuned.controller.gains.kp
+
+
+def test_filters_are_added_to_a_cascade_where_they_pay(found: ga.Diagnosis, tuned: ga.Retuning) -> None:
+    cascade = ga.retune(found, ga.Cascade(GIVEN), phase_margin=50.0, gain_margin=9.0)
+    assert isinstance(cascade.controller, ga.Cascade)
+    added = len(cascade.controller.torque_filters)
+    paid = any("Added" in note for note in cascade.notes)
+    assert (added > 0) == paid == any("would be" in note for note in tuned.notes)
+    assert not paid or cascade.after.stiffness.value > 1.1 * tuned.after.stiffness.value
+    phase, gain, stable = margins_of(LAGGED, cascade.controller)
+    assert stable and phase >= 49.5 and gain >= 8.9
+
+
+def test_the_gain_of_a_position_controller_is_proposed_too(found: ga.Diagnosis) -> None:
+    cascade = ga.Cascade(GIVEN, position=ga.P(5.0), position_period=2e-3, velocity_feedforward=1.0)
+    result = ga.retune(found, cascade)
+    proposal = result.controller
+    assert isinstance(proposal, ga.Cascade) and proposal.position is not None
+    assert proposal.position.gain > 5.0 and proposal.velocity_feedforward == 1.0
+    assert result.after.position_phase_margin is not None and result.after.position_phase_margin.low >= 44.0
+    assert result.after.overshoot.value < 5.0 and result.after.settling_time.value < result.before.settling_time.value
+    assert "position gain" in result.summary()
+
+
+def test_a_proportional_loop_stays_one(found: ga.Diagnosis) -> None:
+    result = ga.retune(found, ga.Cascade(ga.PI(0.02, 0.0), position=ga.P(5.0)), filters=False)
+    proposal = result.controller
+    assert isinstance(proposal, ga.Cascade) and proposal.position is not None
+    assert proposal.velocity.ki == 0.0 and proposal.velocity.kp > 0.02 and proposal.position.gain > 5.0 and result.keeps
+    assert result.after.stiffness.value > 2.0 * result.before.stiffness.value
+
+
+def test_where_no_gains_are_stable_the_given_ones_stay(found: ga.Diagnosis) -> None:
+    spring = ga.Model(2500.0, [-5.0 + 60.0j, -5.0 - 60.0j], [0.0])
+    result = ga.retune(replace(found, model=spring, covariance=None))
+    assert result.controller == GIVEN and not result.keeps and "stable" in result.missed
+    assert any("the given ones stay" in note for note in result.notes) and "NOT STABLE" in result.summary()
+
+
+def test_a_falsified_model_is_said_so_first(found: ga.Diagnosis) -> None:
+    hidden = LAGGED.with_effect("coulomb_friction", torque=0.3)
+    idn = ga.identify(log_of(hidden, GIVEN), controller=GIVEN)
+    assert idn.falsified
+    result = ga.retune(idn, filters=False)
+    assert result.summary().startswith("Warning: The data contradict this model: the linear model is falsified.")
+    assert "in doubt" in repr(result)
+    doubts = doubts_of(replace(found, verdict="partly explained", loop_follows=False))
+    assert "the verdict of the diagnosis is partly explained" in doubts[0]
+    assert len(doubts) == 2 and "The logged force does not follow" in said(doubts[1], "linear")
+
+
+def test_effects_that_are_not_linear_are_simulated(tuned: ga.Retuning) -> None:
+    friction = {"torque": 0.05, "static_torque": 0.4, "stribeck_velocity": 0.5}
+    sticking = LAGGED.with_effect("stribeck_friction", **friction)
+    told = simulated_with(sticking, GIVEN, tuned.controller, T, 20.0, tuned.after)
+    assert any("stick-slip" in s for s in told)
+    ((name, now, then),) = without_each(sticking, tuned.controller, T, 20.0, tuned.after)
+    assert name == "stribeck_friction" and then < now
+    shown = replace(tuned, mended=((name, now, then),), simulated=told).summary()
+    assert "if mended" in shown and "stick-slip" in shown
+    loose = ga.TwoMass(JM=2e-4, DM=1e-4, JL=4e-4, DL=1e-4, KG=40.0, DG=4e-3).model().with_effect("backlash", gap=0.2)
+    told = simulated_with(loose, GIVEN, ga.PI(0.2, 60.0), T, 2.0, tuned.after)
+    assert any("limit cycle" in s for s in told), told
+    told = simulated_with(LAGGED, GIVEN, ga.PI(0.06, 3.0, torque_limit=0.5), T, 60.0, tuned.after)
+    assert any("reaches the limit" in s for s in told)
+    assert not simulated_with(LAGGED, GIVEN, tuned.controller, T, 20.0, tuned.after)
+
+
+def test_it_is_saved_drawn_and_told(tuned: ga.Retuning, tmp_path: Path) -> None:
+    tuned.save(tmp_path / "tuned.json")
+    assert ga.load(tmp_path / "tuned.json") == tuned
+    jsonschema = pytest.importorskip("jsonschema")
+    jsonschema.Draft202012Validator(schema()).validate(json.loads(json_text(tuned.to_dict())))
+    assert len(tuned.plot().axes) == 3
+    text = tuned.summary()
+    assert "phase margin" in text and "N m/rad" in text and "hold in" in text
+    assert "N/m" in tuned.summary(axis="linear") and "N m" not in tuned.summary(axis="linear")
+
+
+def test_a_loaded_result_needs_the_sample_time_and_the_same_seed_gives_the_same(
+    found: ga.Diagnosis, tuned: ga.Retuning, tmp_path: Path
+) -> None:
+    found.save(tmp_path / "found.json")
+    loaded = ga.load(tmp_path / "found.json")
+    assert isinstance(loaded, ga.Diagnosis)
+    with pytest.raises(ga.GaidentError, match=r"give dt="):
+        ga.retune(loaded)
+    again = ga.retune(loaded, phase_margin=50.0, gain_margin=9.0, dt=T, step=tuned.step)
+    assert again == tuned
+
+
+@pytest.mark.parametrize(
+    ("named", "message"),
+    [({"phase_margin": 95.0}, "phase_margin is 95"), ({"gain_margin": 0.0}, "gain_margin is 0"), ({"step": -1.0}, "step is -1"),
+     ({"torque_limit": 0.0}, "torque_limit is 0"), ({"torque_noise": "x"}, "torque_noise"), ({"seed": -1}, "seed is -1"),
+     ({"dt": 0.0}, "dt is 0"), ({"filters": 1}, "filters is 1"), ({"controller": 3}, "controller is 3"),
+     ({"controller": ga.PI(0.02, None)}, "ki=None"), ({"controller": ga.PI(0.02, 0.5, loop="continuous")}, "continuous loop")],
+)  # fmt: skip
+def test_wrong_use_is_told(found: ga.Diagnosis, named: dict[str, Any], message: str) -> None:
+    with pytest.raises(ga.GaidentError, match=message):
+        ga.retune(found, **named)
+    with pytest.raises(ga.GaidentError, match="result is str"):
+        ga.retune("found")  # type: ignore[arg-type]
