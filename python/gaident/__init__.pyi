@@ -4,6 +4,7 @@ from .data import Alignment, Record, Winding, align, columns, differentiate, rea
 from .diagnosis import diagnose, first_experiment
 from .errors import GaidentError
 from .estimation import ForceError, WindingFit, estimate_winding, force_error, inverse_dynamics
+from .fleets import Fleet, fleet
 from .identification import LeastSquares, identify, least_squares, m_sequence
 from .models import (
     Discrete,
@@ -35,6 +36,7 @@ __all__ = [
     "Effect",
     "Estimate",
     "Finding",
+    "Fleet",
     "ForceError",
     "GaidentError",
     "Identification",
@@ -63,6 +65,7 @@ __all__ = [
     "estimate_winding",
     "factor_parameters",
     "first_experiment",
+    "fleet",
     "force_error",
     "identify",
     "initial_state",

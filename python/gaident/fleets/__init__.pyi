@@ -1,0 +1,3 @@
+from .fleet import Fleet, fleet
+
+__all__ = ["Fleet", "fleet"]
