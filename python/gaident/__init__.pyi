@@ -4,7 +4,7 @@ from .data import Alignment, Record, Winding, align, columns, differentiate, rea
 from .diagnosis import diagnose, first_experiment
 from .errors import GaidentError
 from .estimation import ForceError, WindingFit, estimate_winding, force_error, inverse_dynamics
-from .fleets import Fleet, fleet
+from .fleets import Fleet, Trends, fleet, trends
 from .identification import LeastSquares, identify, least_squares, m_sequence
 from .models import (
     Discrete,
@@ -53,6 +53,7 @@ __all__ = [
     "Run",
     "SearchSpace",
     "Settings",
+    "Trends",
     "TwoMass",
     "Winding",
     "WindingFit",
@@ -84,6 +85,7 @@ __all__ = [
     "run",
     "simulate",
     "simulate_many",
+    "trends",
 ]
 
 __version__: str

@@ -1,10 +1,10 @@
-"""Options and help of `gaident fleet`."""
+"""Options and help of `gaident fleet` and `gaident trends`."""
 
 from __future__ import annotations
 
 import argparse
 
-__all__ = ["FLEET_EXAMPLES", "FLEET_HELP", "add_fleet_options"]
+__all__ = ["FLEET_EXAMPLES", "FLEET_HELP", "TRENDS_EXAMPLES", "TRENDS_HELP", "add_fleet_options", "add_trends_options"]
 
 FLEET_HELP = """\
 Diagnoses many logs, each by itself, with all processors, and keeps what was found as a dataset (Parquet, or CSV
@@ -16,6 +16,15 @@ FLEET_EXAMPLES = """\
 examples:
   gaident fleet 'logs/**/*.csv' --drive drive.toml --out fleet
   gaident fleet 'logs/**/*.csv' --drive drive.toml --names '(?P<axis>x\\d+)_(?P<time>[\\dT-]+)'
+"""
+TRENDS_HELP = """\
+Shows what changed on which axis of a fleet: the course of every parameter with its deviations, changes beyond the
+scatter of the logs before, axes that differ from their siblings, and where the logs are too poor to say.
+"""
+TRENDS_EXAMPLES = """\
+examples:
+  gaident trends fleet
+  gaident trends fleet --out trends.html         one page, and the reports that it opens beside it
 """
 
 
@@ -33,3 +42,12 @@ def add_fleet_options(parser: argparse.ArgumentParser) -> None:
     g.add_argument("--seed", type=int, default=0, metavar="N", help="same seed, same result (default 0)")
     g.add_argument("--workers", type=int, metavar="N", help="processes (default: one for each processor)")
     g.add_argument("--json", action="store_true", help="print the counts as JSON")
+
+
+def add_trends_options(parser: argparse.ArgumentParser) -> None:
+    """What `gaident trends` takes."""
+    parser.add_argument("fleet", metavar="FLEET", help="the folder that gaident fleet wrote")
+    g = parser.add_argument_group("results")
+    g.add_argument("--out", metavar="FILE", help="write it as one HTML page, which needs no network")
+    g.add_argument("--no-reports", dest="reports", action="store_false", help="without the reports that the page opens")
+    g.add_argument("--json", action="store_true", help="print JSON instead of text")

@@ -10,7 +10,14 @@ from typing import Any, NoReturn
 
 from gaident.axis import percent
 from gaident.cli.export_options import EXPORT_EXAMPLES, EXPORT_HELP, add_export_options
-from gaident.cli.fleet_options import FLEET_EXAMPLES, FLEET_HELP, add_fleet_options
+from gaident.cli.fleet_options import (
+    FLEET_EXAMPLES,
+    FLEET_HELP,
+    TRENDS_EXAMPLES,
+    TRENDS_HELP,
+    add_fleet_options,
+    add_trends_options,
+)
 from gaident.cli.log_options import add_log_commands, add_log_options, gain, number
 from gaident.cli.report_options import REPORT_EXAMPLES, REPORT_HELP, add_report_option, add_report_options
 from gaident.control.words import LOOPS
@@ -190,6 +197,9 @@ def parser_of(commands: Mapping[str, str]) -> argparse.ArgumentParser:
     add_fleet_options(sub)
     add_log_options(sub)
     _add_controller_options(sub)
+
+    sub = command("trends", "FLEET ", "what changed on which axis of a fleet", TRENDS_HELP, TRENDS_EXAMPLES)
+    add_trends_options(sub)
 
     sub = command(
         "simulate",

@@ -10,6 +10,7 @@ from typing import Any
 __all__ = [
     "AHEAD",
     "CALIBRATED",
+    "COURSES",
     "DRIVES",
     "EFFORT",
     "ENCODER",
@@ -39,6 +40,7 @@ __all__ = [
     "calibrated",
     "cause",
     "check",
+    "course",
     "effort",
     "experiment",
     "gain",
@@ -77,10 +79,11 @@ RESPONSES = "responses"
 HEADERS = "headers"
 PITCHES = "pitches"
 NUMBERS = "numbers"
+COURSES = "courses"
 SHOWN_BY = (
     *(DRIVES, SHORT, LOOP, SLOWER, SHIFTED, REAL, REGRESSION, SUCCESS, WINDING, FORMS, LOGS),
     *(ENCODER, PERIODS, PROFILES, AHEAD, SAMPLED, SHORT_MOVES, LAGS),
-    *(PROPOSALS, UNLOGGED, RESPONSES, HEADERS, PITCHES, NUMBERS),
+    *(PROPOSALS, UNLOGGED, RESPONSES, HEADERS, PITCHES, NUMBERS, COURSES),
 )
 
 GAIN = "Is the gain enough?"
@@ -92,6 +95,7 @@ READING = "How is a log read?"
 RECORD = "What does a record show?"
 LINEAR = "Which linear model?"
 EXPERIMENTS = "What may an experiment ask of the axis?"
+FLEETS = "What does the course of a parameter show?"
 EFFORT = "Effort"
 
 
@@ -141,6 +145,10 @@ def linear(value: float, unit: str, source: str, cases: str) -> Any:
 
 def experiment(value: float, unit: str, source: str) -> Any:
     return _row(EXPERIMENTS, value, unit, source, PROPOSALS)
+
+
+def course(value: float, unit: str, source: str) -> Any:
+    return _row(FLEETS, value, unit, source, COURSES)
 
 
 def effort(value: float, unit: str, source: str) -> Any:
