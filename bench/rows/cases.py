@@ -25,6 +25,7 @@
     responses   frequency responses that a record shows by itself (rows/responses.py)
     headers     names of columns, commas and letters of text logs (rows/headers.py)
     numbers     controllers with numbers that nobody gave (rows/numbers.py)
+    courses     parameters of an axis over months: steps, drifts, temperature, nothing (rows/courses.py)
     pitches     linear axes whose force returns with a length that nobody gave (rows/pitches.py)
     retuned     gains that are proposed for random drives, on the true ones (rows/retuned.py)
 
@@ -49,6 +50,7 @@ import blind
 import numpy as np
 import success
 from rows.case import Case, Result, digest
+from rows.courses import change_found, courses
 from rows.encoders import encoders, lines_shown
 from rows.forms import forms, shown
 from rows.headers import header_read, headers
@@ -287,6 +289,7 @@ KINDS: dict[str, tuple[Callable[[int, int], list[Case]], Callable[[Case], Result
     "responses": (responses, shown_points),
     "headers": (headers, header_read),
     "pitches": (pitches, pitch_seen),
+    "courses": (courses, change_found),
     "numbers": (numbers, found_numbers),
     "retuned": (retuned, gains_kept),
 }

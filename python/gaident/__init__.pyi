@@ -4,6 +4,7 @@ from .data import Alignment, Record, Winding, align, columns, differentiate, rea
 from .diagnosis import diagnose, first_experiment
 from .errors import GaidentError
 from .estimation import ForceError, WindingFit, estimate_winding, force_error, inverse_dynamics
+from .fleets import Fleet, Trends, fleet, trends
 from .identification import LeastSquares, identify, least_squares, m_sequence
 from .models import (
     Discrete,
@@ -62,6 +63,7 @@ __all__ = [
     "Estimate",
     "FeedforwardTables",
     "Finding",
+    "Fleet",
     "ForceError",
     "FrictionMap",
     "GaidentError",
@@ -84,6 +86,7 @@ __all__ = [
     "SearchSpace",
     "Settings",
     "Spread",
+    "Trends",
     "TwoMass",
     "Wave",
     "Winding",
@@ -99,6 +102,7 @@ __all__ = [
     "factor_parameters",
     "feedforward",
     "first_experiment",
+    "fleet",
     "force_error",
     "friction_map",
     "identify",
@@ -119,6 +123,7 @@ __all__ = [
     "run",
     "simulate",
     "simulate_many",
+    "trends",
 ]
 
 __version__: str

@@ -25,6 +25,8 @@ __all__ = ["COMMANDS", "main"]
 COMMANDS = {
     "identify": "identify:identify_command",
     "diagnose": "diagnose:diagnose_command",
+    "fleet": "fleet:fleet_command",
+    "trends": "trends:trends_command",
     "simulate": "simulate:simulate_command",
     "report": "report:report_command",
     "export": "export:export_command",

@@ -10,6 +10,14 @@ from typing import Any, NoReturn
 
 from gaident.axis import percent
 from gaident.cli.export_options import EXPORT_EXAMPLES, EXPORT_HELP, add_export_options
+from gaident.cli.fleet_options import (
+    FLEET_EXAMPLES,
+    FLEET_HELP,
+    TRENDS_EXAMPLES,
+    TRENDS_HELP,
+    add_fleet_options,
+    add_trends_options,
+)
 from gaident.cli.log_options import add_log_commands, add_log_options, gain, number
 from gaident.cli.remedy_options import (
     FEEDFORWARD_EXAMPLES,
@@ -192,6 +200,14 @@ def parser_of(commands: Mapping[str, str]) -> argparse.ArgumentParser:
     add_report_option(g)
     g.add_argument("--next-command", metavar="FILE", help="write the proposed experiment's command (CSV)")
     g.add_argument("--json", action="store_true", help="print what --out saves instead of the summary")
+
+    sub = command("fleet", "LOG... ", "many logs -> a dataset of diagnoses", FLEET_HELP, FLEET_EXAMPLES)
+    add_fleet_options(sub)
+    add_log_options(sub)
+    _add_controller_options(sub)
+
+    sub = command("trends", "FLEET ", "what changed on which axis of a fleet", TRENDS_HELP, TRENDS_EXAMPLES)
+    add_trends_options(sub)
 
     sub = command(
         "simulate",

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import os
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
@@ -35,6 +34,7 @@ from gaident.models.model import Model
 from gaident.models.search_space import SearchSpace
 from gaident.models.starts import noise_std, starts_moving
 from gaident.policy.table import POLICY
+from gaident.processors import processors
 from gaident.results.adequacy import Adequacy
 from gaident.results.identification import Identification
 from gaident.results.settings import Settings
@@ -129,7 +129,7 @@ def identify(
     given, loop = looped.records, looped.controller
     check_numbers(trials, seed, workers, progress)
     check_arithmetic(settings, loop)
-    threads = _processors() if workers is None else int(workers)
+    threads = processors() if workers is None else int(workers)
     digests = distinct(given)
     # Sums must not depend on the order given.
     order = sorted(range(len(given)), key=lambda i: (digests[i], given[i].name))
@@ -386,9 +386,3 @@ def _spread(records: Sequence[Record], block: int = 1 << 18) -> float:  # no dec
     mean = sum(float(r.velocity.sum()) for r in records) / sum(len(r) for r in records)
     parts = (r.velocity[i : i + block] - mean for r in records for i in range(0, len(r), block))
     return sum(float(np.einsum("i,i", w, w)) for w in parts)  # in one thread, unlike w @ w
-
-
-def _processors() -> int:
-    if hasattr(os, "sched_getaffinity"):
-        return len(os.sched_getaffinity(0))
-    return os.cpu_count() or 1

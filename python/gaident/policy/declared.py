@@ -10,6 +10,7 @@ from typing import Any
 __all__ = [
     "AHEAD",
     "CALIBRATED",
+    "COURSES",
     "DRIVES",
     "EFFORT",
     "ENCODER",
@@ -40,6 +41,7 @@ __all__ = [
     "calibrated",
     "cause",
     "check",
+    "course",
     "effort",
     "experiment",
     "gain",
@@ -80,10 +82,11 @@ HEADERS = "headers"
 PITCHES = "pitches"
 NUMBERS = "numbers"
 RETUNED = "retuned"
+COURSES = "courses"
 SHOWN_BY = (
     *(DRIVES, SHORT, LOOP, SLOWER, SHIFTED, REAL, REGRESSION, SUCCESS, WINDING, FORMS, LOGS),
     *(ENCODER, PERIODS, PROFILES, AHEAD, SAMPLED, SHORT_MOVES, LAGS),
-    *(PROPOSALS, UNLOGGED, RESPONSES, HEADERS, PITCHES, NUMBERS, RETUNED),
+    *(PROPOSALS, UNLOGGED, RESPONSES, HEADERS, PITCHES, NUMBERS, RETUNED, COURSES),
 )
 
 GAIN = "Is the gain enough?"
@@ -96,6 +99,7 @@ RECORD = "What does a record show?"
 LINEAR = "Which linear model?"
 EXPERIMENTS = "What may an experiment ask of the axis?"
 REMEDIES = "Which gains are proposed?"
+FLEETS = "What does the course of a parameter show?"
 EFFORT = "Effort"
 
 
@@ -149,6 +153,10 @@ def experiment(value: float, unit: str, source: str) -> Any:
 
 def remedy(value: float, unit: str, source: str) -> Any:
     return _row(REMEDIES, value, unit, source, RETUNED)
+
+
+def course(value: float, unit: str, source: str) -> Any:
+    return _row(FLEETS, value, unit, source, COURSES)
 
 
 def effort(value: float, unit: str, source: str) -> Any:

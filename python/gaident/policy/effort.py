@@ -33,6 +33,8 @@ class Effort:
     commands: int = effort(4, "1", "of the menu of experiments, on which rivals are fitted, not only linearised")
     smaller_commands: int = effort(4, "1", "times that a proposed command is made smaller, until it keeps the torque limit")
     quickened: int = effort(60, "1", "times that a proposed command is made shorter, until it fits the time asked for")
+    tasks_for_each: int = effort(4, "1", "logs of a fleet that are sent ahead to each process, so that none waits")
+    tasks_under_way: int = effort(256, "1", "logs of a fleet that are sent ahead to an executor, whose size nobody knows")
     paired_columns: int = effort(30, "1", "columns of a log at most, whose pairs are tried as position and velocity")
 
     # Iterations of a fit.

@@ -5,9 +5,10 @@ A decision is never made by a number that stands elsewhere: `tests/python/projec
 Numbers that follow from records without effects are calibrated: `python bench/blind.py --calibrate` writes them into
 `calibrated.json`, which is read here. The others are set by hand, for the reason that their row gives.
 
-Six groups stand in modules of their own: how a log is read (`readings.py`), what a record shows (`records.py`), which linear
+Seven groups stand in modules of their own: how a log is read (`readings.py`), what a record shows (`records.py`), which linear
 model holds and in which band a regression looks (`linear.py`), which controllers are looked for (`controllers.py`), what a
-proposed experiment may ask of the axis (`experiments.py`), which gains are proposed (`remedies.py`).
+proposed experiment may ask of the axis (`experiments.py`), which gains are proposed (`remedies.py`), what the course of a
+parameter over months shows (`fleets.py`).
 
 Effort is the last group (`effort.py`): what bounds the work of a search or a fit, such as iterations, starts, points of a grid,
 samples that are looked at. More of it may find more, and changes no decision about what was found.
@@ -56,6 +57,7 @@ from gaident.policy.declared import (
 )
 from gaident.policy.effort import Effort
 from gaident.policy.experiments import Experiments
+from gaident.policy.fleets import Courses
 from gaident.policy.linear import LinearModels
 from gaident.policy.readings import Readings
 from gaident.policy.records import Records
@@ -339,7 +341,7 @@ class Decisions:
 
 
 @dataclass(frozen=True)
-class Policy(Effort, RetunedGains, Experiments, LinearModels, Records, Readings, ControllerRanges, Decisions):
+class Policy(Effort, RetunedGains, Courses, Experiments, LinearModels, Records, Readings, ControllerRanges, Decisions):
     """The whole table: first what decides, then effort. `rows()` lists all with unit, source and command."""
 
 

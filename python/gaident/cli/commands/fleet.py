@@ -1,0 +1,39 @@
+"""gaident fleet."""
+
+from __future__ import annotations
+
+import sys
+from argparse import Namespace
+from dataclasses import asdict
+
+from gaident.cli.drive import drive_of
+from gaident.cli.output import print_json
+from gaident.fleets.fleet import fleet
+from gaident.show.progress_bar import Progress
+
+__all__ = ["fleet_command"]
+
+
+def fleet_command(args: Namespace) -> int:
+    drive = drive_of(args)
+    with Progress(None if args.quiet else sys.stderr) as progress:
+        found = fleet(
+            args.logs,
+            out=args.out,
+            resume=not args.again,
+            drive=drive,
+            names=args.names,
+            method=args.method,
+            quick=args.quick,
+            temperature=args.temperature,
+            seed=args.seed,
+            workers=args.workers,
+            progress=progress,
+        )
+    if args.json:
+        print_json({"schema": "gaident/fleet", "schema_version": 1, **asdict(found)})
+    else:
+        print(found.summary())
+        for row in found.first_failed():
+            print(f"  failed: {row}")
+    return 0 if found.done else 1

@@ -1,0 +1,136 @@
+"""Changes in the course of a parameter, found one log after the other, with a rate of false alarms that is held.
+
+Of an axis, y_i is the logarithm of a positive parameter (else the parameter over the median of its size), s_i its deviation, T_i
+the temperature where it is logged.
+Behind each log n, the last m logs, m = 3, 5, 8, 13, 21 and 34, are compared with those before them, b of them, 20 or more:
+
+    y_i = a + c (T_i - T)  is fitted to those before, twice, the second time without what is 3.5 deviations off (`course_clip`),
+    r_i = y_i - a - c (T_i - T),  v_i = s_i^2 + t^2,  t^2 what the scatter of r shows beyond the s_i,
+    z   = sum of clip(r_i/sqrt(v_i), -3.5, 3.5) over the m logs / sqrt(m + u' C u),
+
+u the sum of the rows (1, T_i - T) of the m logs over sqrt(v_i), C the inverse of the normal matrix of the fit.
+The scale comes from those of b logs that are kept, k the terms of the fit; it knows 0.7 (b - k) degrees of freedom, less than
+all, as what is left out may have been scatter: z is compared with the quantile of Student's distribution with so many, at
+`course_alarm`.
+A change begins with the m of the largest z, and the next one is looked for behind it.
+What log n says never depends on later logs: a course that is read every night raises the same alarms as one that is read once.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import t as student
+
+from gaident.policy.table import POLICY
+
+__all__ = ["Shift", "levels_of", "scaled", "shifts_of"]
+
+Vector = NDArray[np.float64]
+
+LENGTHS = (3, 5, 8, 13, 21, 34)  # no decision: a grid of how many logs a change is behind
+MAD = 1.4826  # no decision: a formula: standard deviations in the median deviation of a normal distribution
+KNOWN = 0.7  # no decision: a formula: efficiency of a deviation of what such a bound leaves
+
+
+@dataclass(frozen=True)
+class Shift:
+    """A change: index of its first log, of the log that showed it, its size (of y) with deviation, and z."""
+
+    first: int
+    found: int
+    size: float
+    std: float
+    score: float
+
+
+@dataclass(frozen=True)
+class _Line:
+    """y = a + c (T - T0) of logs before, the scatter t^2 beyond their deviations, and the |z| that it needs."""
+
+    coefficients: Vector
+    inverse: NDArray[np.float64]
+    scatter: float
+    needed: float
+
+
+def scaled(values: Vector, deviations: Vector) -> tuple[Vector, Vector]:
+    """(y, s): relative values, whose differences are fractions of the parameter."""
+    if np.all(values > 0.0):
+        return np.log(values), deviations / values
+    size = float(np.median(np.abs(values))) or 1.0
+    return values / size, deviations / size
+
+
+def shifts_of(values: Vector, deviations: Vector, temperatures: Vector | None) -> list[Shift]:
+    """The changes of a course, in the order of time; values and deviations as `scaled` gives them."""
+    rows = np.ones((len(values), 1))
+    if temperatures is not None:
+        rows = np.column_stack([rows, temperatures - float(np.mean(temperatures[: POLICY.course_before]))])
+    found: list[Shift] = []
+    lines: dict[int, _Line] = {}
+    begin, n = 0, POLICY.course_before + POLICY.course_after - 1
+    while n < len(values):
+        best = _best(values, deviations, rows, begin, n, lines)
+        if best is None:
+            n += 1
+            continue
+        found.append(best)
+        begin = best.first
+        lines.clear()
+        n = max(n + 1, begin + POLICY.course_before + POLICY.course_after - 1)
+    return found
+
+
+def _best(y: Vector, s: Vector, rows: NDArray[np.float64], begin: int, n: int, lines: dict[int, _Line]) -> Shift | None:
+    """The change that log n shows, if it does; lines: by the first log behind them."""
+    best: Shift | None = None
+    for m in LENGTHS:
+        first = n + 1 - m
+        if m < POLICY.course_after or first - begin < POLICY.course_before:
+            continue
+        if first not in lines:
+            lines[first] = _line(y[begin:first], s[begin:first], rows[begin:first])
+        line = lines[first]
+        behind = slice(first, n + 1)
+        r = y[behind] - rows[behind] @ line.coefficients
+        sigma = np.sqrt(s[behind] ** 2 + line.scatter)
+        u = (rows[behind] / sigma[:, None]).sum(axis=0)
+        z = float(np.clip(r / sigma, -POLICY.course_clip, POLICY.course_clip).sum() / np.sqrt(m + u @ line.inverse @ u))
+        weights = sigma**-2.0
+        size = float(np.median(r))
+        if abs(z) > line.needed and abs(size) > POLICY.course_material and (best is None or abs(z) > abs(best.score)):
+            mean = (rows[behind] * weights[:, None]).sum(axis=0) / weights.sum()
+            best = Shift(first, n, size, float(np.sqrt(1.0 / weights.sum() + mean @ line.inverse @ mean)), z)
+    return best
+
+
+def _line(y: Vector, s: Vector, rows: NDArray[np.float64]) -> _Line:
+    used = np.ones(len(y), dtype=bool)
+    scatter = 0.0
+    for last in (False, True):
+        weights = np.where(used, 1.0 / (s**2 + scatter + POLICY.course_scatter**2), 0.0)
+        # A temperature that did not change says nothing about its slope: a ridge far below what a degree does.
+        normal = (rows * weights[:, None]).T @ rows + np.diag([0.0, *[1e-6] * (rows.shape[1] - 1)])
+        inverse: NDArray[np.float64] = np.linalg.inv(normal).astype(np.float64)
+        coefficients: Vector = inverse @ (rows * weights[:, None]).T @ y
+        r = y - rows @ coefficients
+        away = np.abs(r - np.median(r))  # of the middle: two bad logs of twenty move the line
+        if last:
+            spread = float(np.sqrt(np.sum(r[used] ** 2) / max(used.sum() - rows.shape[1], 1)))
+        else:
+            spread = MAD * float(np.median(away))
+        scatter = max(spread**2 - float(np.median(s**2)), POLICY.course_scatter**2)
+        if not last:
+            used = away <= POLICY.course_clip * np.sqrt(s**2 + scatter)
+    known = KNOWN * (len(y) - rows.shape[1])
+    return _Line(coefficients, inverse, scatter, float(student.isf(0.5 * POLICY.course_alarm, known)))
+
+
+def levels_of(values: Vector, shifts: list[Shift]) -> list[tuple[int, int, float]]:
+    """(first, behind the last, median of y) of the stretches between the changes."""
+    ends = [0, *(s.first for s in shifts), len(values)]
+    return [(a, b, float(np.median(values[a:b]))) for a, b in pairwise(ends) if b > a]

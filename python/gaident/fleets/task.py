@@ -1,0 +1,164 @@
+"""What is done with one log: read, diagnosed or identified, and turned into rows. It never raises; an error is a row."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Callable, Mapping
+from contextlib import ExitStack
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from gaident.control.controller import Controller
+from gaident.data.readers import read, read_columns
+from gaident.data.record import Record
+from gaident.diagnosis.blas import one_thread
+from gaident.diagnosis.diagnose import diagnose
+from gaident.drive.drive_file import Drive
+from gaident.errors import GaidentError, ReadError
+from gaident.fleets.rows import rows_of
+from gaident.identification.identify import identify
+from gaident.processors import one_processor
+from gaident.version import version
+
+__all__ = ["METHODS", "Job", "Outcome", "FleetTask", "content_of", "lost", "perform"]
+
+METHODS = ("diagnose", "identify")
+HERE = "{log}"
+"""Stands for the path in a message: two logs of the same content have one result."""
+
+BLOCK = 1 << 20  # no decision: memory: bytes of a log that are read at once
+
+
+@dataclass(frozen=True)
+class FleetTask:
+    """The settings that all logs have in common; `digest` names them."""
+
+    method: str
+    controller: Controller | None
+    kind: str
+    drive: Drive | None = None
+    reading: Mapping[str, Any] = field(default_factory=dict)
+    more: Mapping[str, Any] = field(default_factory=dict)  # further arguments of diagnose or identify
+    temperature: str | None = None
+    seed: int = 0
+    version: str = field(default_factory=version)
+
+    @property
+    def digest(self) -> str:
+        """Digest of everything on which a result depends but the log."""
+        drive = self.drive
+        parts = {
+            "method": self.method,
+            "controller": None if self.controller is None else self.controller.to_dict(),
+            "kind": self.kind,
+            "drive": None if drive is None else [drive.general, drive.columns, drive.units, drive.shift],
+            "reading": self.reading,
+            "more": self.more,
+            "temperature": self.temperature,
+            "seed": self.seed,
+            "version": self.version,
+        }
+        return _digest(json.dumps(parts, sort_keys=True, default=repr).encode())
+
+    def key(self, content: str, log: str) -> str:
+        """Name of the result of a log: of its content, of its ending, by which its format is known, and of the settings."""
+        return _digest(f"{content} {Path(log).suffix.lower()} {self.digest}".encode())
+
+
+@dataclass(frozen=True)
+class Job:
+    """One log to be worked on; content: digest of its bytes, key: the name of its result."""
+
+    log: str
+    content: str
+    key: str
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What became of a log; status "done", "failed" (it would fail again) or "lost" (it may be tried again)."""
+
+    log: str
+    key: str
+    status: str
+    error: str = ""
+    seconds: float = 0.0
+    row: Mapping[str, Any] = field(default_factory=dict)
+    parameters: tuple[Mapping[str, Any], ...] = ()
+    text: str = ""  # of the result's JSON
+
+
+def lost(job: Job, why: str) -> Outcome:
+    """A log whose worker ended without an answer."""
+    return Outcome(job.log, job.key, "lost", why)
+
+
+def _digest(content: bytes) -> str:
+    return hashlib.sha256(content).hexdigest()
+
+
+def content_of(path: str) -> str:
+    """Digest of a file's bytes; raises OSError."""
+    digest = hashlib.sha256()
+    with open(path, "rb") as stream:
+        while block := stream.read(BLOCK):
+            digest.update(block)
+    return digest.hexdigest()
+
+
+def perform(task: FleetTask, job: Job) -> Outcome:
+    """The job's outcome; never raises but for Ctrl-C. It uses one processor."""
+    try:
+        with ExitStack() as stack:
+            stack.enter_context(one_processor())
+            stack.enter_context(one_thread())
+            return _performed(task, job)
+    except GaidentError as error:
+        return Outcome(job.log, job.key, "failed", str(error).replace(job.log, HERE))
+    except MemoryError:
+        return lost(job, f"{HERE}: the memory was not enough; use fewer workers, or decimate the log")
+    except OSError as error:
+        return lost(job, f"{HERE}: cannot be read ({error.strerror or error}); check the file, and call again")
+    except Exception as error:
+        why = f"internal error, please report it: {type(error).__name__}: {error}"
+        return Outcome(job.log, job.key, "failed", f"{HERE}: {why.replace(job.log, HERE)}")
+
+
+def _performed(task: FleetTask, job: Job) -> Outcome:
+    records = _records(task, job.log)
+    temperature = None if task.temperature is None else _mean_of(task, job.log)
+    if content_of(job.log) != job.content:
+        return lost(job, f"{HERE}: the file changed while it was read; call again when it is complete")
+    given = {"controller": task.controller, "seed": task.seed, **task.more}
+    whole: Callable[..., Any] = diagnose if task.method == METHODS[0] else identify
+    if whole is diagnose:
+        given["axis"] = task.kind
+    result = whole(records, **given)
+    row, parameters = rows_of(result, records, task.kind, temperature)
+    return Outcome(job.log, job.key, "done", "", result.seconds, row, parameters, result.to_json())
+
+
+def _records(task: FleetTask, log: str) -> list[Record]:
+    # The name is no content of the log: what is saved of two equal logs is the same.
+    if task.drive is not None:
+        return task.drive.records(log)
+    return [read(log, **task.reading)]
+
+
+def _mean_of(task: FleetTask, log: str) -> float | None:
+    """Mean of the column with the temperature, in its own unit; None where a log has no value of it."""
+    general = task.reading if task.drive is None else task.drive.general
+    text = {name: general[name] for name in ("delimiter", "decimal", "skip", "encoding") if name in general}
+    found = read_columns(log, **text)
+    values = found.get(str(task.temperature))
+    if values is None:
+        plain = {name.split(" [")[0]: column for name, column in found.items()}
+        values = plain.get(str(task.temperature))
+    if values is None:
+        raise ReadError(f"{log}: there is no column {task.temperature!r} with the temperature; it has {', '.join(found)}")
+    known = values[np.isfinite(values)]
+    return float(known.mean()) if known.size else None

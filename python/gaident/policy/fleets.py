@@ -1,0 +1,26 @@
+"""What the course of a parameter over months shows: changes, and axes that differ; with unit, source and command."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from gaident.policy.declared import course
+
+__all__ = ["Courses"]
+
+
+@dataclass(frozen=True)
+class Courses:
+    """See the module; `gaident.policy.table.rows()` lists these rows among the others."""
+
+    course_alarm: float = course(
+        2e-6, "probability", "of the test of one split of one course, by which it may be a change by chance"
+    )
+    course_before: int = course(20, "logs", "before a change at least: their scatter is the scale of everything behind them")
+    course_after: int = course(3, "logs", "behind a change at least: one or two may be a damaged log")
+    course_clip: float = course(3.5, "1", "standard deviations at most by which one log counts for a change")
+    course_material: float = course(0.05, "1", "of the value: a change that is less is none of the axis that matters")
+    course_unsure: float = course(0.5, "1", "of a value: one whose deviation is more has no place in a course")
+    course_scatter: float = course(0.005, "1", "of the value, that logs of one axis scatter at least, whatever they show")
+    sibling_level: float = course(0.01, "probability", "that one of all axes differs from its siblings by chance")
+    siblings: int = course(5, "axes", "of which one may differ: fewer say nothing about the spread between units")

@@ -1,0 +1,272 @@
+"""A fleet of logs: every log is a row, what is done is not done again, and a run that is killed loses nothing."""
+
+from __future__ import annotations
+
+import errno
+import importlib
+import os
+import runpy
+import signal
+import subprocess
+import sys
+import time
+from concurrent.futures import ThreadPoolExecutor
+from functools import partial
+from pathlib import Path
+
+import pytest
+from fleet_cases import children, content, fatal, write_log, write_logs
+
+import gaident as ga
+from cli_cases import interrupted
+from gaident.cli import main
+from gaident.errors import SettingsError
+from gaident.fleets import dataset, engine
+from gaident.fleets.names import names_of
+from gaident.fleets.task import Job
+from places import PACKAGE, ROOT
+
+fleet = importlib.import_module("gaident.fleets.fleet")
+identified = partial(ga.fleet, "logs/**/*.csv", method="identify", temperature="heat")
+RUN = """
+import gaident as ga
+if __name__ == "__main__":
+    ga.fleet("logs/**/*.csv", method="identify", temperature="heat", out="killed", workers=1)
+"""
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with logs, and the dataset of a run that nothing disturbed."""
+    folder = tmp_path_factory.mktemp("fleet")
+    write_logs(folder / "logs")
+    before = Path.cwd()
+    os.chdir(folder)
+    try:
+        found = identified(out="whole", executor=map)
+    finally:
+        os.chdir(before)
+    assert (found.logs, found.done, found.failed, found.there) == (7, 6, 1, 0)
+    return folder
+
+
+@pytest.fixture
+def inside(whole: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.chdir(whole)
+    return whole
+
+
+def test_every_log_is_a_row(inside: Path) -> None:
+    rows = list(fleet.kept_fleet("whole").rows())
+    assert [(r["axis"], r["month"], r["status"]) for r in rows if r["axis"] == "x"] == [
+        ("x", "2026-01", "done"),
+        ("x", "2026-01", "done"),
+        ("x", "2026-02", "done"),
+    ]
+    (failed,) = (r for r in rows if r["status"] == "failed")
+    assert failed["log"] == "logs/y/2026-01-20.csv" and failed["log"] in failed["error"] and failed["result"] is None
+    for row in rows:
+        if row is not failed:
+            assert row["temperature"] == 30.0 and row["samples"] == 240 and row["version"] and row["content"]
+            saved = ga.load(Path("whole") / row["result"])
+            assert isinstance(saved, ga.Identification)
+    values = list(fleet.kept_fleet("whole").rows("parameters"))
+    gains = {r["axis"]: r["value"] for r in values if r["parameter"] == "gain"}
+    assert gains["x"] == pytest.approx(100.0, rel=0.1) and gains["y"] == pytest.approx(50.0, rel=0.1)
+
+
+def test_a_diagnosis_has_mechanics_and_friction(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    write_log(tmp_path / "logs" / "x" / "2026-01-01.csv", 1)
+    found = ga.fleet("logs", names=lambda path: ("x", fleet.datetime(2026, 1, 1)), out="one", executor=map)
+    assert found.failed == 1  # a folder is no log
+    found = ga.fleet("logs/x/*", out="one", quick=True, executor=map)
+    assert found.done == 1
+    values = {r["parameter"]: r for r in found.rows("parameters") if r["of"] == "mechanics"}
+    assert abs(values["inertia"]["value"] - 0.01) < 4 * values["inertia"]["std"] + 1e-4
+    assert values["inertia"]["unit"] == "kg m^2" and values["inertia"]["verdict"]
+
+
+def test_what_is_there_is_not_done_again(inside: Path) -> None:
+    before = content(Path("whole"))
+    found = identified(out="whole", executor=lambda work, jobs: pytest.fail("nothing is to be done"))
+    assert (found.done, found.failed, found.there) == (6, 1, 7)
+    assert content(Path("whole")) == before
+    with ThreadPoolExecutor(1) as executor:
+        again = identified(out="whole", executor=executor, resume=False)
+    assert again.there == 0 and content(Path("whole")) == before
+
+
+def test_other_settings_and_other_content_are_other_results(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    log = tmp_path / "logs" / "x" / "2026-01-01.csv"
+    write_log(log, 1)
+    assert identified(out="out", executor=map).there == 0
+    assert identified(out="out", executor=map, seed=2).there == 0
+    write_log(log, 2)
+    assert identified(out="out", executor=map).there == 0
+    assert len(list(Path("out/results").rglob("*.json"))) == 3
+    assert len(list(fleet.kept_fleet("out").rows())) == 1  # the last one counts
+    log.unlink()
+    gone = ga.fleet([str(log)], method="identify", out="out", executor=map)
+    assert gone.failed == 1 and "there is no such log" in gone.first_failed()[0]
+
+
+def test_a_killed_run_goes_on_to_the_same_dataset(inside: Path) -> None:
+    script = inside / "run.py"
+    script.write_text(RUN)
+    with subprocess.Popen([sys.executable, str(script)], env={**os.environ, "PYTHONPATH": str(PACKAGE.parent)}) as run:
+        until = time.monotonic() + 60.0
+        while not list((inside / "killed").rglob("*.json")):
+            assert time.monotonic() < until and run.poll() is None
+            time.sleep(0.01)
+        workers = children(run.pid)
+        run.kill()
+    assert workers
+    until = time.monotonic() + 10.0
+    while any(Path(f"/proc/{pid}/cmdline").exists() and Path(f"/proc/{pid}/cmdline").read_bytes() for pid in workers):
+        assert time.monotonic() < until, "a worker outlives its parent"
+        time.sleep(0.05)
+    done = len(list((inside / "killed").rglob("*.json")))
+    found = identified(out="killed", executor=map)
+    assert 0 < found.there <= done + 1 and found.logs == 7
+    assert content(inside / "killed") == content(inside / "whole")
+
+
+def test_a_killed_worker_costs_nothing(inside: Path) -> None:
+    killed: list[int] = []
+
+    def kill(done: float, message: str) -> None:
+        if not killed:
+            killed.extend(children(os.getpid())[:1])
+            os.kill(killed[0], signal.SIGKILL)
+
+    found = identified(out="worker", workers=1, progress=kill)
+    assert killed and (found.done, found.failed) == (6, 1)
+    assert content(inside / "worker") == content(inside / "whole")
+
+
+def test_ctrl_c_keeps_what_is_done(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    for day in range(10, 30):
+        write_log(tmp_path / "logs" / "x" / f"2026-01-{day}.csv", day)
+    interrupted(["fleet", "logs/x/*.csv", "--loop", "open", "--out", "out", "--workers", "1"], after=5.0)
+    done = len(list(Path("out/results").rglob("*.json")))
+    rows = list(fleet.kept_fleet("out").rows()) if done else []
+    assert len(rows) == done < 20
+
+
+def test_the_page_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    pytest.importorskip("pyarrow")
+    pytest.importorskip("duckdb")
+    monkeypatch.chdir(tmp_path)
+    pages = runpy.run_path(str(ROOT / "docs" / "tools" / "run_pages.py"))
+    pages["worked"]((ROOT / "docs/how-to/fleets.md").read_text(encoding="utf-8"), "the page of fleets")
+
+
+def test_a_log_that_ends_its_process_is_a_row() -> None:
+    jobs = [Job(name, name, name) for name in ("a", "fatal", "b")]
+    found = {o.log: o for o in engine._by_processes(fatal, iter(jobs), 1)}
+    assert {log: o.status for log, o in found.items()} == {"a": "done", "b": "done", "fatal": "lost"}
+    assert "fewer workers" in found["fatal"].error
+
+
+def test_a_full_disk_keeps_what_is_done(inside: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    real, count = fleet.write_whole, []
+
+    def full(path: Path, text: bytes) -> None:
+        count.append(path)
+        if len(count) == 3:
+            raise OSError(errno.ENOSPC, "No space left on device", str(path))
+        real(path, text)
+
+    monkeypatch.setattr(fleet, "write_whole", full)
+    with pytest.raises(OSError, match="No space left"):
+        identified(out="full", executor=map)
+    monkeypatch.setattr(fleet, "write_whole", real)
+    assert identified(out="full", executor=map).there == 2
+    assert content(inside / "full") == content(inside / "whole")
+
+
+def test_dask_loses_no_log_with_a_worker(inside: Path) -> None:
+    distributed = pytest.importorskip("distributed", reason="Dask is not installed: pip install 'gaident[dask]'")
+    import warnings
+
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        where = {"n_workers": 2, "threads_per_worker": 1, "processes": True, "dashboard_address": None}
+        with distributed.LocalCluster(**where) as cluster, distributed.Client(cluster) as client:
+            killed: list[int] = []
+
+            def kill(done: float, message: str) -> None:
+                if not killed:
+                    killed.append(next(iter(client.run(os.getpid).values())))
+                    os.kill(killed[0], signal.SIGKILL)
+
+            found = identified(out="dask", executor=client.get_executor(), progress=kill)
+    assert killed and (found.done, found.failed) == (6, 1)
+    assert content(inside / "dask") == content(inside / "whole")
+
+
+def test_without_pyarrow_the_tables_are_csv(inside: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(dataset.importlib.util, "find_spec", lambda name: None)
+    found = identified(out="text", executor=map)
+    assert sorted({f.suffix for f in Path("text/logs").rglob("part.*")}) == [".csv"]
+    rows = zip(found.rows(), fleet.kept_fleet("whole").rows(), strict=True)
+    for text, binary in rows:
+        assert {k: v for k, v in text.items() if v not in ("", None)} == {k: v for k, v in binary.items() if v not in ("", None)}
+
+
+def test_the_command_does_the_same(inside: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    options = ["--out", "whole", "--method", "identify", "--temperature", "heat", "--workers", "1"]
+    assert main(["fleet", "logs/x/*.csv", *options, "--loop", "open"]) == 0
+    assert "3 logs: 3 done, 0 failed" in capsys.readouterr().out
+    assert main(["fleet", "logs/none/*.csv", *options]) == 2
+    assert "no file fits this pattern" in capsys.readouterr().err
+
+
+def test_names_say_axis_and_time() -> None:
+    by_folder = names_of(None)
+    axis, when = by_folder("plant/press 4/2026-03-31T14-05-09.csv")
+    assert axis == "press 4" and when.isoformat() == "2026-03-31T14:05:09+00:00"
+    assert by_folder("press/20260331/run.csv")[0] == "press"
+    axis, when = names_of(r"(?P<axis>x\d+)_(?P<time>[\d-]+)")("all/x12_2026-03-31.csv")
+    assert axis == "x12" and when.day == 31
+    for wrong, said in ((r"(", "no regular expression"), ("axis", "no group"), (3, "give a regular expression")):
+        with pytest.raises(SettingsError, match=said):
+            names_of(wrong)
+    with pytest.raises(SettingsError, match="does not fit"):
+        names_of(r"(?P<axis>x\d+)")("y.csv")
+    with pytest.raises(SettingsError, match="is none"):
+        by_folder("x/2026-02-31.csv")
+
+
+@pytest.mark.parametrize(
+    ("wrong", "said"),
+    [
+        ({"executor": 3}, "executor is 3"),
+        ({"workers": 0}, "workers is 0"),
+        ({"method": "guess"}, "method is 'guess'"),
+        ({"resume": 1}, "resume is 1"),
+        ({"read": {"colums": {}}}, "colums"),
+        ({"quick": True}, "belong to a diagnosis"),
+        ({"seed": -1}, "seed is -1"),
+        ({"temperature": 3}, "temperature is 3"),
+        ({"names": 3}, "names is 3"),
+        ({"progress": 3}, "progress is 3"),
+        ({"axis": "round"}, "round"),
+        ({"drive": "none.toml"}, "no such drive file"),
+        ({"out": "run.txt"}, "this is a file"),
+    ],
+)
+def test_wrong_use_is_named(inside: Path, wrong: dict[str, object], said: str) -> None:
+    (inside / "run.txt").write_text("")
+    with pytest.raises(ga.GaidentError, match=said):
+        ga.fleet("logs/x/*.csv", **{"method": "identify", "out": "wrong", **wrong})  # type: ignore[arg-type]
+
+
+def test_two_runs_do_not_write_at_the_same_time(inside: Path) -> None:
+    from gaident.fleets.index import opened
+
+    with opened(Path("locked")), pytest.raises(ga.GaidentError, match="another process writes there"):
+        ga.fleet("logs/x/*.csv", method="identify", out="locked", executor=map)

@@ -1,0 +1,120 @@
+"""Trends of a fleet: changes, axes that differ, what is too poor, and the page."""
+
+from __future__ import annotations
+
+import json
+from datetime import datetime, timedelta
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import gaident as ga
+from gaident.cli import main
+from gaident.fleets.changes import scaled, shifts_of
+from gaident.fleets.dataset import best_format, write_part
+
+DAYS = 90
+BEGIN = datetime(2026, 1, 1)
+
+
+def write_course(out: Path, axis: str, values: np.ndarray, heat: float | None = 30.0, **more: Any) -> None:
+    """A fleet's tables of one axis with a parameter of a log a day."""
+    months: dict[str, list[dict[str, Any]]] = {}
+    for day, value in enumerate(values):
+        time = (BEGIN + timedelta(days=day)).isoformat()
+        row = {"log": f"{axis}/{time[:10]}.csv", "time": time, "status": "done", "verdict": "explained", "temperature": heat}
+        told = {"of": "mechanics", "effect": "", "side": "", "parameter": "inertia", "unit": "kg m^2", "alternatives": ""}
+        told |= {"value": float(value), "std": 0.01 * abs(value), "at_bound": False, "identifiable": True}
+        months.setdefault(time[:7], []).append({**row, **told, **more})
+    for month, rows in months.items():
+        for table in ("logs", "parameters"):
+            write_part(out, table, axis, month, rows, best_format())
+
+
+def noisy(level: float, seed: int, days: int = DAYS) -> np.ndarray:
+    return level * np.exp(0.02 * np.random.default_rng(seed).standard_normal(days))
+
+
+@pytest.fixture
+def fleet_of_seven(tmp_path: Path) -> Path:
+    out = tmp_path / "fleet"
+    for k in range(6):
+        write_course(out, f"axis {k}", noisy(1.0 + 0.02 * k, k) * np.where(np.arange(DAYS) >= 60, 1.2 if k == 3 else 1.0, 1.0))
+    write_course(out, "<b>odd</b>", noisy(3.0, 9, 10))
+    return out
+
+
+def test_a_step_is_found_with_its_size_and_its_day(fleet_of_seven: Path) -> None:
+    found = ga.trends(fleet_of_seven)
+    (change,) = found.changes
+    assert (change.axis, change.quantity, change.unit) == ("axis 3", "inertia", "kg m^2")
+    assert abs((datetime.fromisoformat(change.began) - BEGIN).days - 60) <= 1
+    assert (datetime.fromisoformat(change.found) - BEGIN).days <= 67
+    assert change.share == pytest.approx(0.2, abs=4.0 * change.std) and change.after > change.before
+    assert change.log == f"axis 3/{change.began[:10]}.csv"
+    assert "axis 3" in found.summary() and "Too poor to say: 1 of 7" in found.summary()
+
+
+def test_an_axis_that_differs_and_one_that_is_too_poor(fleet_of_seven: Path) -> None:
+    found = ga.trends(fleet_of_seven)
+    assert found.siblings[0].axis == "<b>odd</b>" and found.siblings[0].spreads > 10.0
+    (poor,) = found.poor
+    assert poor.axis == "<b>odd</b>" and poor.poor.startswith("only 10 usable logs")
+
+
+def test_later_logs_change_no_alarm() -> None:
+    values = noisy(1.0, 1, 150) * np.where(np.arange(150) >= 80, 1.15, 1.0)
+    y, s = scaled(values, 0.01 * values)
+    whole = shifts_of(y, s, None)
+    assert whole
+    for n in (whole[0].found, whole[0].found + 1, 120):
+        assert shifts_of(y[:n], s[:n], None) == [shift for shift in whole if shift.found < n]
+
+
+def test_temperature_is_no_change_and_hides_none() -> None:
+    rng = np.random.default_rng(3)
+    heat = 20.0 + 10.0 * np.sin(2.0 * np.pi * np.arange(200) / 200) + 2.0 * rng.standard_normal(200)
+    values = np.exp(-0.02 * heat + 0.02 * rng.standard_normal(200))
+    y, s = scaled(values, 0.01 * values)
+    assert shifts_of(y, s, None)
+    assert not shifts_of(y, s, heat)
+    y[120:] += 0.2
+    (shift,) = shifts_of(y, s, heat)
+    assert abs(shift.first - 120) <= 1 and shift.size == pytest.approx(0.2, abs=0.05)
+
+
+def test_outliers_are_no_change() -> None:
+    values = noisy(1.0, 5, 120)
+    values[[25, 40, 41, 90]] *= 3.0
+    y, s = scaled(values, 0.01 * values)
+    assert not shifts_of(y, s, None)
+    assert not shifts_of(np.zeros(60), np.zeros(60), None)  # no scatter at all
+
+
+def test_values_that_say_nothing_are_left_out(tmp_path: Path) -> None:
+    write_course(tmp_path / "fleet", "x", noisy(1.0, 1), at_bound=True)
+    (course,) = ga.trends(tmp_path / "fleet").courses
+    assert course.poor == "only 0 usable logs; a change shows from 23 on; 90 at a bound or undetermined"
+    with pytest.raises(ga.GaidentError, match="no table"):
+        ga.trends(tmp_path)
+
+
+def test_the_page_needs_nothing_else_and_escapes_names(fleet_of_seven: Path, tmp_path: Path) -> None:
+    page = tmp_path / "trends.html"
+    ga.trends(fleet_of_seven, page)
+    text = page.read_text(encoding="utf-8")
+    assert "<b>odd</b>" not in text and "&lt;b&gt;odd&lt;/b&gt;" in text
+    assert (
+        "http://" not in text and "https://" not in text and "src=" not in text.replace("script-src", "").replace("style-src", "")
+    )
+    assert text.count("<svg") == 7 and text.count('class="changed"') == 1
+
+
+def test_the_command_says_the_same(fleet_of_seven: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["trends", str(fleet_of_seven), "--json"]) == 0
+    said = json.loads(capsys.readouterr().out)
+    assert [c["axis"] for c in said["changes"]] == ["axis 3"] and said["poor"][0]["axis"] == "<b>odd</b>"
+    assert main(["trends", str(fleet_of_seven)]) == 0
+    assert "Axes that differ from their siblings" in capsys.readouterr().out
