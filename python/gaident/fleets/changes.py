@@ -6,13 +6,16 @@ Behind each log n, the last m logs, m = 3, 5, 8, 13, 21 and 34, are compared wit
 
     y_i = a + c (T_i - T)  is fitted to those before, twice, the second time without what is 3.5 deviations off (`course_clip`),
     r_i = y_i - a - c (T_i - T),  v_i = s_i^2 + t^2,  t^2 what the scatter of r shows beyond the s_i,
-    z   = sum of clip(r_i/sqrt(v_i), -3.5, 3.5) over the m logs / sqrt(m + u' C u),
+    z   = sum of clip(r_i/sqrt(v_i), -h, h) over the m logs / sqrt(m + u' C u),
+    h   = 3.5 where m = 3, else the larger of 3.5 and the size of the median of r_i/sqrt(v_i),
 
-u the sum of the rows (1, T_i - T) of the m logs over sqrt(v_i), C the inverse of the normal matrix of the fit.
-The scale comes from those of b logs that are kept, k the terms of the fit; it knows 0.7 (b - k) degrees of freedom, less than
-all, as what is left out may have been scatter: z is compared with the quantile of Student's distribution with so many, at
-`course_alarm`.
-A change begins with the m of the largest z, and the next one is looked for behind it.
+so that one damaged log counts no more than the others, and logs that agree count as far as they are off.
+u is the sum of the rows (1, T_i - T) of the m logs over sqrt(v_i), C the inverse of the normal matrix of the fit.
+The scale comes from those of b logs that are kept, k the terms of the fit.
+It knows 0.7 (b - k) degrees of freedom (`course_known`), less than all, as what is left out may have been scatter: z is compared
+with the quantile of Student's distribution with so many, at `course_alarm`.
+A change begins with the m of the largest z, without those at their beginning that are off by less than half their median.
+The next one is looked for behind it.
 What log n says never depends on later logs: a course that is read every night raises the same alarms as one that is read once.
 """
 
@@ -33,7 +36,6 @@ Vector = NDArray[np.float64]
 
 LENGTHS = (3, 5, 8, 13, 21, 34)  # no decision: a grid of how many logs a change is behind
 MAD = 1.4826  # no decision: a formula: standard deviations in the median deviation of a normal distribution
-KNOWN = 0.7  # no decision: a formula: efficiency of a deviation of what such a bound leaves
 
 
 @dataclass(frozen=True)
@@ -99,12 +101,16 @@ def _best(y: Vector, s: Vector, rows: NDArray[np.float64], begin: int, n: int, l
         r = y[behind] - rows[behind] @ line.coefficients
         sigma = np.sqrt(s[behind] ** 2 + line.scatter)
         u = (rows[behind] / sigma[:, None]).sum(axis=0)
-        z = float(np.clip(r / sigma, -POLICY.course_clip, POLICY.course_clip).sum() / np.sqrt(m + u @ line.inverse @ u))
+        off = r / sigma
+        bound = max(POLICY.course_clip, abs(float(np.median(off)))) if m >= POLICY.course_agree else POLICY.course_clip
+        z = float(np.clip(off, -bound, bound).sum() / np.sqrt(m + u @ line.inverse @ u))
         weights = sigma**-2.0
         size = float(np.median(r))
         if abs(z) > line.needed and abs(size) > POLICY.course_material and (best is None or abs(z) > abs(best.score)):
+            near = np.abs(off) < 0.5 * abs(float(np.median(off)))  # no decision: a formula: half way
+            start = first + int(np.argmin(near))
             mean = (rows[behind] * weights[:, None]).sum(axis=0) / weights.sum()
-            best = Shift(first, n, size, float(np.sqrt(1.0 / weights.sum() + mean @ line.inverse @ mean)), z)
+            best = Shift(start, n, size, float(np.sqrt(1.0 / weights.sum() + mean @ line.inverse @ mean)), z)
     return best
 
 
@@ -126,7 +132,7 @@ def _line(y: Vector, s: Vector, rows: NDArray[np.float64]) -> _Line:
         scatter = max(spread**2 - float(np.median(s**2)), POLICY.course_scatter**2)
         if not last:
             used = away <= POLICY.course_clip * np.sqrt(s**2 + scatter)
-    known = KNOWN * (len(y) - rows.shape[1])
+    known = POLICY.course_known * (len(y) - rows.shape[1])
     return _Line(coefficients, inverse, scatter, float(student.isf(0.5 * POLICY.course_alarm, known)))
 
 

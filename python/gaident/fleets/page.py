@@ -22,7 +22,7 @@ from gaident.results.store import load
 __all__ = ["write_page"]
 
 MOST_DRAWN = 600  # no decision: drawn: pictures of a page, those with changes first
-WIDTH, HEIGHT, LEFT, RIGHT, TOP, BOTTOM = 300, 130, 46, 8, 8, 18  # no decision: drawn: pixels
+WIDTH, HEIGHT, LEFT, RIGHT, TOP, BOTTOM = 300, 130, 56, 8, 8, 18  # no decision: drawn: pixels
 ROOM = 0.08  # no decision: drawn: above and below the values
 SECURITY = "default-src 'none'; style-src 'unsafe-inline'; script-src 'unsafe-inline'"
 
@@ -55,7 +55,9 @@ def write_page(found: Trends, folder: Path, target: Path, reports: bool) -> None
     links = _reports(found, folder, target) if reports else {}
     failed = sum(a.failed for a in found.axes)
     counts = f"{len(found.axes)} axes, {sum(a.logs for a in found.axes)} logs, {failed} of them without a result."
-    parts = [f"<h1>Fleet {escape(folder.name)}</h1>", f"<p>{counts} {len(found.changes)} changes.</p>"]
+    changes = len(found.changes)
+    told = f"{changes or 'No'} change{'' if changes == 1 else 's'}."
+    parts = [f"<h1>Fleet: {escape(folder.name)}</h1>", f"<p>{counts} {told}</p>"]
     by_axis: dict[str, int] = {}
     for change in found.changes:
         by_axis[change.axis] = by_axis.get(change.axis, 0) + 1
@@ -111,7 +113,7 @@ def write_page(found: Trends, folder: Path, target: Path, reports: bool) -> None
         body = f"<details><summary>{len(rows)} of {len(found.courses)} courses</summary>{_table(heads, rows)}</details>"
         parts += ["<h2>Too poor to say</h2>", body]
     policy = f'<meta http-equiv="Content-Security-Policy" content="{SECURITY}">'
-    head = f'<meta charset="utf-8">{policy}<title>Fleet {escape(folder.name)}</title><style>{STYLE}</style>'
+    head = f'<meta charset="utf-8">{policy}<title>Fleet: {escape(folder.name)}</title><style>{STYLE}</style>'
     body = "\n".join(parts)
     text = f'<!doctype html><html lang="en"><head>{head}</head><body>{body}<script>{SCRIPT}</script></body></html>\n'
     write_whole(target, text.encode())
@@ -209,7 +211,11 @@ def _picture(c: Course) -> str:
         for k, level in enumerate(levels)
     ]
     lines += [f'<path d="M{x(b):.1f} {TOP}V{HEIGHT - BOTTOM}" stroke="#c2410c" stroke-dasharray="3 3"/>' for b in begins]
-    texts = [f'<text x="2" y="{y(v) + 3:.1f}">{v:.3g}</text>' for v in (low + room, high - room)]
+    shown = low + room, high - room
+    # As many digits as tell the two apart, and one more.
+    size = max(map(abs, shown))
+    digits = max(3, 2 + int(np.ceil(np.log10(size / (shown[1] - shown[0]))))) if shown[1] > shown[0] and size > 0.0 else 3
+    texts = [f'<text x="2" y="{y(v) + 3:.1f}">{v:.{digits}g}</text>' for v in shown]
     texts += [f'<text x="{LEFT}" y="{HEIGHT - 4}">{day_of(c.times[0])}</text>']
     texts += [f'<text x="{WIDTH - RIGHT}" y="{HEIGHT - 4}" text-anchor="end">{day_of(c.times[-1])}</text>']
     frame = f'<path d="M{LEFT} {TOP}V{HEIGHT - BOTTOM}H{WIDTH - RIGHT}" stroke="#9aa7b3" fill="none"/>'

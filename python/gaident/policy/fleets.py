@@ -19,6 +19,14 @@ class Courses:
     course_before: int = course(20, "logs", "before a change at least: their scatter is the scale of everything behind them")
     course_after: int = course(3, "logs", "behind a change at least: one or two may be a damaged log")
     course_clip: float = course(3.5, "1", "standard deviations at most by which one log counts for a change")
+    course_agree: int = course(
+        5,
+        "logs",
+        "behind a change, from which on their median says how far one may count: of 2 % damaged ones, three of five are rare",
+    )
+    course_known: float = course(
+        0.7, "1", "of the logs before a change, that the scale of their scatter knows: what was left out may have been scatter"
+    )
     course_material: float = course(0.05, "1", "of the value: a change that is less is none of the axis that matters")
     course_unsure: float = course(0.5, "1", "of a value: one whose deviation is more has no place in a course")
     course_scatter: float = course(0.005, "1", "of the value, that logs of one axis scatter at least, whatever they show")

@@ -85,6 +85,18 @@ def test_temperature_is_no_change_and_hides_none() -> None:
     assert abs(shift.first - 120) <= 1 and shift.size == pytest.approx(0.2, abs=0.05)
 
 
+def test_logs_that_agree_are_told_soon_and_damaged_ones_are_not() -> None:
+    """Behind 21 logs: seven that are 30 % off are a change from the first of them on, two that are e times off are none."""
+    rng = np.random.default_rng(5)
+    level = np.where(np.arange(28) < 21, 0.0, 0.3)
+    s = np.full(28, 0.003)
+    (shift,) = shifts_of(level + s * rng.standard_normal(28), s, None)
+    assert (shift.first, shift.size) == (21, pytest.approx(0.3, abs=0.01)) and shift.found <= 25
+    damaged = s * rng.standard_normal(28)
+    damaged[[22, 25]] = 1.0
+    assert shifts_of(damaged, s, None) == []
+
+
 def test_outliers_are_no_change() -> None:
     values = noisy(1.0, 5, 120)
     values[[25, 40, 41, 90]] *= 3.0
