@@ -86,6 +86,9 @@ struct Drive {  // SI units, rad; neutral values
     double hum = 0;            // torque in time [N m],
     double hum_frequency = 0;  // Hz
     double hum_phase = 0;
+    double turning = 0;        // share by which the load's inertia, with one mass all of it, changes with its angle
+    double turning_order = 1;
+    double turning_phase = 0;
     double loaded = 0;       // dry friction as a share of the torque that gravity and the load put on the axis
     double walking = 0;      // dry friction walking (1 + W), W a random walk of walk_size in a second, never below 0,
     double walk_size = 0;    // 1/s^0.5
@@ -258,11 +261,16 @@ private:
         } else if (ends[0].dry) {
             net -= way[0] * ends[0].level(x, t, way[0]);
         }
-        dx[w1] = resting ? 0 : (g * net + stored(x) - d.D1 * x[w1] - tc) / d.J1;
+        // J(theta) = J (1 + a cos(psi)), and the torque -J'(theta) w^2/2
+        const double theta = d.J2 > 0 ? x[angle] - x[twist] : x[angle], psi = d.turning_order * theta + d.turning_phase;
+        const double share = 1 + d.turning * std::cos(psi), bend = 0.5 * d.turning * d.turning_order * std::sin(psi);
+        const double J1 = d.J2 > 0 ? d.J1 : d.J1 * share, J2 = d.J2 * share;
+        const double outward = d.J2 > 0 ? 0 : d.J1 * bend * x[w1] * x[w1];
+        dx[w1] = resting ? 0 : (g * net + stored(x) - d.D1 * x[w1] - tc + outward) / J1;
         dx[angle] = x[w1];
         if (d.J2 > 0) {
             const double own = smooth(1, x, t) - (ends[1].dry ? way[1] * ends[1].level(x, t, way[1]) : 0);
-            dx[w2] = ends[1].dry && way[1] == 0 ? 0 : (tc - d.D2 * x[w2]) / d.J2 + own / d.J2;
+            dx[w2] = ends[1].dry && way[1] == 0 ? 0 : (tc - d.D2 * x[w2] + own + d.J2 * bend * x[w2] * x[w2]) / J2;
             dx[twist] = x[w1] - x[w2];
             if (d.hysteretic != 0) {
                 const double rate = dx[twist], yielded = d.hysteretic * x[hysteresis] / d.hysteretic_torque;

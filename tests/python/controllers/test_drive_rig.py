@@ -142,7 +142,7 @@ def smooth_motion(plant: Plant, torque: float, effect: str, f: dict[str, float],
 
     def slope(t: float, x: Array) -> list[float]:
         w, theta, w2, twist, z = x
-        q = torque
+        q, inertia = torque, plant.J
         if "stribeck_velocity" in f:
             q -= np.sign(w) * (f["torque"] + (f["static_torque"] - f["torque"]) * np.exp(-((w / f["stribeck_velocity"]) ** 2)))
         if "torque_positive" in f:
@@ -151,6 +151,12 @@ def smooth_motion(plant: Plant, torque: float, effect: str, f: dict[str, float],
             q -= f["coefficient"] * np.sign(w) * abs(w) ** (0.5 if effect == "square_root_drag" else 2.0)
         if effect == "position_friction":
             q -= f["torque"] * (1 + f["amplitude"] * np.cos(f["order"] * theta + f["phase"])) * np.sign(w)
+        elif effect == "torque_hum":
+            q += f["amplitude"] * np.sin(2.0 * np.pi * f["frequency"] * t + f["phase"])
+        elif effect == "position_inertia":
+            psi = f["order"] * theta + f["phase"]
+            q += 0.5 * plant.J * f["amplitude"] * f["order"] * np.sin(psi) * w**2
+            inertia = plant.J * (1.0 + f["amplitude"] * np.cos(psi))
         elif "amplitude" in f:
             q -= f["amplitude"] * np.sin(f.get("order", 1.0) * theta + f["phase"])
         if "rate" in f:
@@ -165,7 +171,7 @@ def smooth_motion(plant: Plant, torque: float, effect: str, f: dict[str, float],
         rate = w - w2 if shaft else w
         dz = rate - abs(rate) * bristle / f["torque"] if "stiffness" in f else 0.0
         load = ((spring - plant.DL * w2) / plant.JL, w - w2) if plant.two_masses else (0.0, 0.0)
-        return [(q - plant.D * w - (spring if plant.two_masses else 0)) / plant.J, w, *load, dz]
+        return [(q - plant.D * w - (spring if plant.two_masses else 0)) / inertia, w, *load, dz]
 
     start = [np.sign(torque) * 1e-300, 0, 0, 0, 0]
     solution = solve_ivp(slope, (0, t[-1]), start, "LSODA", t, rtol=1e-9, atol=1e-11, max_step=1e-4)
@@ -190,6 +196,8 @@ def smooth_motion(plant: Plant, torque: float, effect: str, f: dict[str, float],
         ("hysteretic_coupling", {"torque": 0.02, "stiffness": 6.0}),
         ("square_root_drag", {"coefficient": 6e-3}),
         ("position_friction", {"torque": 0.05, "amplitude": 0.8, "order": 2.0, "phase": 0.3}),
+        ("torque_hum", {"amplitude": 0.04, "frequency": 37.0, "phase": 0.3}),
+        ("position_inertia", {"amplitude": 0.4, "order": 2.0, "phase": 0.3}),
     ],
 )
 @pytest.mark.parametrize("way", [1, -1])

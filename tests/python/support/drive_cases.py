@@ -59,9 +59,11 @@ EFFECTS = (
     "hysteretic_coupling",
     "square_root_drag",
     "position_friction",
+    "torque_hum",
+    "position_inertia",
 )
 NOISE_EFFECTS = ("velocity_quantisation", "outliers")
-LATER = ("hysteretic_coupling", "square_root_drag", "position_friction")
+LATER = ("hysteretic_coupling", "square_root_drag", "position_friction", "torque_hum", "position_inertia")
 """Effects that are younger than the tables of bench/README.md: what a seed draws there stays the same without them."""
 FRICTION = (
     *("coulomb_friction", "stribeck_friction", "asymmetric_friction", "presliding_friction", "friction_drift"),
@@ -314,6 +316,7 @@ def draw_effect(name: str, factor: float, plant: Plant, samples: int, rng: np.ra
         "velocity_ripple": {"amplitude": 5e-3 * factor, "order": float(rng.choice([1, 2, 4])), "phase": phase},
         "velocity_quantisation": {"step": 0.63 * factor},
         "outliers": {"fraction": max(3, round(0.002 * factor * samples)) / samples},
+        "position_inertia": {"amplitude": min(0.6, 0.2 * factor), "order": float(rng.choice([1, 2, 3])), "phase": phase},
         "torque_hum": {"amplitude": 0.03 * factor, "frequency": float(rng.uniform(10, 50)), "phase": phase},
         "position_friction": {"torque": 0.05 * factor, "amplitude": 0.8, "order": float(rng.choice([1, 2, 3])), "phase": phase},
         # A torque of friction, beside a shaft that has as much stiffness as the element, from half of it to twice as much.

@@ -128,6 +128,7 @@ FIELDS: dict[str, dict[str, str]] = {
     "velocity_ripple": {"amplitude": "ripple", "order": "ripple_order", "phase": "ripple_phase"},
     "velocity_quantisation": {"step": "quantum"},
     "extra_resonance": {"frequency": "wp", "damping": "zp", "zero_frequency": "wz", "zero_damping": "zz"},
+    "position_inertia": {"amplitude": "turning", "order": "turning_order", "phase": "turning_phase"},
     "torque_hum": {"amplitude": "hum", "frequency": "hum_frequency", "phase": "hum_phase"},
     "random_walk_friction": {"torque": "walking", "size": "walk_size", "number": "walk_number"},
     "thermal_gain": {"share": "gain_lost", "time_constant": "warming"},
