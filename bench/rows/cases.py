@@ -25,9 +25,9 @@
     responses   frequency responses that a record shows by itself (rows/responses.py)
     headers     names of columns, commas and letters of text logs (rows/headers.py)
     numbers     controllers with numbers that nobody gave (rows/numbers.py)
-    courses     parameters of an axis over months: steps, drifts, temperature, nothing (rows/courses.py)
+    courses     parameters of an axis over months: steps, drifts, temperature, nothing (rows.made.courses.py)
     pitches     linear axes whose force returns with a length that nobody gave (rows/pitches.py)
-    retuned     gains that are proposed for random drives, on the true ones (rows/retuned.py)
+    retuned     gains that are proposed for random drives, on the true ones (rows.made.retuned.py)
 
 A result has three parts: an outcome, what is said (verdict and findings; the structure; the terms), and a digest of the rest that
 a user reads: parameters to three digits, notes, comparisons, the next experiment.
@@ -50,19 +50,19 @@ import blind
 import numpy as np
 import success
 from rows.case import Case, Result, digest
-from rows.courses import change_found, courses
 from rows.encoders import encoders, lines_shown
 from rows.forms import forms, shown
 from rows.headers import header_read, headers
 from rows.lags import lag_found, lags
 from rows.logs import logs, read_log
+from rows.made.courses import change_found, courses
+from rows.made.retuned import gains_kept, retuned
 from rows.numbers import found_numbers, numbers
 from rows.periods import period_taken, periods
 from rows.pitches import pitch_seen, pitches
 from rows.profiles import interpolated, profiles
 from rows.proposals import kept, proposals
 from rows.responses import responses, shown_points
-from rows.retuned import gains_kept, retuned
 from rows.short_moves import described, short_moves
 from rows.slow_torques import ahead, measured_torques, named_ahead, named_sampled
 from rows.slower import EVERY, shown_slower, slower_forms

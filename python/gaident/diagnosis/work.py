@@ -353,7 +353,8 @@ class Work:
     def _accepted_gains(self) -> Gains:
         """The gains, once every effect that makes held-out data worse is out of the model."""
         while True:
-            given = self.clean, self.validation, self.controller, self._linear_of_part
+            in_time = any(t.in_time for t in self.final.parameters.terms)  # elsewhere in its period in another record
+            given = self.clean, () if in_time else self.validation, self.controller, self._linear_of_part
             gains = measured_gains(*given, self.estimate, self.under, self.noise, self.at_controller.effects)
             if not gains.harmful:
                 return gains

@@ -311,6 +311,10 @@ class _Run:
         """The logs that have no result; the result of each other one is entered."""
         for path in self.index.paths():
             content, why = _content(path)
+            if not content and self.index.done_before(path):  # moved away since: what was found of it stays
+                self.there += 1
+                self._count("done")
+                continue
             key = self.task.key(content or path, path)
             self.index.key_of(path, content, self.settings, self.task.version, key)
             if not content:

@@ -109,6 +109,11 @@ class Index:
                 base.execute("UPDATE logs SET content = ?, settings = ?, version = ?, key = ? WHERE path = ?", values)
                 self._stale(base, "path", path)
 
+    def done_before(self, path: str) -> bool:
+        """Whether a result of a log is there, whatever it was made of."""
+        query = "SELECT 1 FROM logs JOIN results USING (key) WHERE path = ? AND status = 'done'"
+        return self.base.execute(query, (path,)).fetchone() is not None
+
     def known(self, key: str, resume: bool) -> str | None:
         """The status of a result that need not be made again; without `resume` only those of this run."""
         row = self.base.execute("SELECT status, run FROM results WHERE key = ? AND status <> 'lost'", (key,)).fetchone()

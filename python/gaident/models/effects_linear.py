@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from gaident.errors import ModelError
 from gaident.models.roots import quadratic_roots
 
-__all__ = ["LINEAR", "Transfer", "response_of"]
+__all__ = ["LATE", "LINEAR", "Transfer", "response_of"]
 
 
 class Transfer(NamedTuple):
@@ -61,6 +61,14 @@ LINEAR: dict[str, Callable[[Sequence[float]], Transfer]] = {
     "velocity_observer": _tracking,
 }
 """Effect -> its transfer function, from its parameters in the order of the table."""
+
+LATE: dict[str, Callable[[Sequence[float], float], float]] = {
+    "velocity_difference": lambda values, period: 0.5 * values[0] * period,
+}
+"""Effect -> by how much it makes a velocity late [s], from its parameters and the controller's sample time [s].
+
+Of a mean over k samples that is its phase; its size, sin(x)/x with x = k omega T/2, is at most 1.
+"""
 
 
 def frequencies(omega: ArrayLike) -> NDArray[np.float64]:

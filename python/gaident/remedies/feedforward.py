@@ -72,6 +72,12 @@ def feedforward(
     """
     if not isinstance(result, Diagnosis):
         raise SettingsError(f"result is {type(result).__name__}: give what gaident.diagnose found")
+    mechanism = result.model.mechanism
+    if mechanism.gain < 0.0 or mechanism.p < 1:
+        raise SettingsError(
+            f"the model of the result has gain {mechanism.gain:g} and p = {mechanism.p}: tables are made for a drive that a "
+            "positive torque turns forwards, with more poles than zeros; change the sign of the torque, or identify again"
+        )
     for name, count in (("points", points), ("angles", angles)):
         if isinstance(count, bool) or not isinstance(count, int) or not FEWEST <= count <= MOST:
             raise SettingsError(f"{name} is {count!r}: give a whole number from {FEWEST} to {MOST}")
@@ -119,6 +125,8 @@ def _notes(result: Diagnosis, left: list[Text]) -> list[Text]:
     found = []
     if left:
         found.append(say("The tables do not contain {}: it has no curve over the velocity.", joined(", ", left)))
+    if any(effect.row.place == "mechanism" for effect in result.model.effects):
+        found.append(say("The {inertia} changes with the {angle}: the table has its mean."))
     rows = [LIBRARY[e.key] for e in result.model.effects if e.key in LIBRARY]
     if any(row.harmonic == "friction" for row in rows):
         found.append(say("The friction changes with the {angle}: the table has its mean."))

@@ -5,6 +5,7 @@ The command is a step to a speed and back to rest, then a slow speed; under a po
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -65,7 +66,7 @@ def simulated_with(
         old = _trial(model, given, period, step, after)
     except GaidentError:
         old = new
-    said = [*_limit_cycle(new, old, step, period), *_stick_slip(new, old, step), *_limited(new, found)]
+    said = [*_limit_cycle(new, old, step, period), *_stick_slip(new, old, step), *_limited(new, model, found)]
     return tuple(said) or (say("Simulated with all effects of the model, the loop comes to rest and creeps without a stop."),)
 
 
@@ -133,8 +134,9 @@ def _stick_slip(new: _Tried, old: _Tried, step: float) -> list[Text]:
     return [say(text, slow, 100.0 * stands, 100.0 * before)]
 
 
-def _limited(new: _Tried, found: Controller) -> list[Text]:
-    limit = found.limits[0]
+def _limited(new: _Tried, model: Model, found: Controller) -> list[Text]:
+    behind = [e.parameters["limit"] for e in model.effects if e.row.place == "actuator" and "limit" in e.parameters]
+    limit = min(found.limits[0], *behind, math.inf)
     share = float(np.mean(np.abs(new.run.torque) >= limit * (1.0 - 1e-9)))
     if share == 0.0:
         return []

@@ -24,7 +24,7 @@ from scipy.linalg import block_diag, expm
 from gaident.errors import ModelError
 from gaident.export.lti import in_a_row
 from gaident.models.effects import Effect
-from gaident.models.effects_linear import LINEAR, Transfer
+from gaident.models.effects_linear import LATE, LINEAR, Transfer
 from gaident.models.model import Model
 
 __all__ = ["Plants", "PlantResponses", "sampled_plants"]
@@ -131,6 +131,7 @@ def _continuous(model: Model, period: float) -> _Continuous:
     mechanism = model.mechanism
     drive = Transfer(mechanism.gain, mechanism.poles, mechanism.zeros)
     lag, measured = _joined(before), _joined(behind)
+    late = sum(LATE[e.name](e.values, period) for e in model.effects if e.name in LATE)  # a sensor's: in the loop it is a delay
     (A0, B0, C0), (A1, B1, C1), (A2, B2, C2) = (_states(t, period) for t in (lag, drive, measured))
     direct, shown = (float(not t.poles) * t.gain for t in (lag, measured))  # without a lag the torque goes through
     n0, n1 = len(A0), len(A1)
@@ -141,7 +142,7 @@ def _continuous(model: Model, period: float) -> _Continuous:
     B = np.concatenate([B0, direct * B1, none2])
     E = np.concatenate([none0, B1, none2])
     C = np.concatenate([none0, C1, none2])
-    return _Continuous(A, B, E, C, np.concatenate([none0, shown * C1, C2]), lag.delay + measured.delay)
+    return _Continuous(A, B, E, C, np.concatenate([none0, shown * C1, C2]), lag.delay + measured.delay + late)
 
 
 def _joined(effects: Sequence[Effect]) -> Transfer:

@@ -17,6 +17,7 @@ from gaident.control.controller import Controller, checked_controller
 from gaident.control.filters import Filter, LowPass, Notch
 from gaident.control.pi import PI
 from gaident.errors import SettingsError
+from gaident.models.effects_linear import LATE
 from gaident.models.model import Model
 from gaident.policy.table import POLICY
 from gaident.remedies.doubts import doubts_of
@@ -131,7 +132,7 @@ def retune(
     age = result.velocity_age if isinstance(result, Diagnosis) else 0.0
     axis = result.axis if isinstance(result, Diagnosis) else "rotary"
     drawn = drawn_models(result, POLICY.checked_drives, seed)
-    linear = [model.linear for model in drawn]
+    linear = [_with_what_is_late(model) for model in drawn]
     if linear[0].gain < 0.0 or linear[0].p < 1:
         raise SettingsError(
             f"the model of the result has gain {linear[0].gain:g} and p = {linear[0].p}: gains are proposed for a drive that a "
@@ -173,7 +174,7 @@ def retune(
         starts=work.starts(),
         simulated=told,
         mended=without_each(result.model, found, period, asked.step, after),
-        notes=(*notes, *more, *_of_the_covariance(len(drawn) - 1, holds)),
+        notes=(*notes, *more, *_of_the_covariance(len(drawn) - 1, holds), *_of_the_mechanism(result.model)),
         model=result.model,
         period=period,
         velocity_age=age,
@@ -301,6 +302,20 @@ def _of_the_covariance(drives: int, holds: float) -> list[Text]:
     return []
 
 
+def _with_what_is_late(model: Model) -> Model:
+    """The linear part, with what of the sensor is late and linear in no continuous system."""
+    linear = model.linear
+    for effect in model.effects:
+        if effect.name in LATE:
+            linear = linear.with_effect(effect.name, **effect.parameters)
+    return linear
+
+
+def _of_the_mechanism(model: Model) -> list[Text]:
+    text = "The {inertia} changes with the {angle}: the loop is that of its mean, and at the least one the margins are smaller."
+    return [say(text)] if any(effect.row.place == "mechanism" for effect in model.effects) else []
+
+
 def _controller_of(result: object, controller: Controller | None) -> Controller:
     if not isinstance(result, Identification | Diagnosis):
         raise SettingsError(f"result is {type(result).__name__}: give what gaident.identify or gaident.diagnose found")
@@ -322,9 +337,13 @@ def _period_of(result: Identification | Diagnosis, given: Controller, dt: float 
         period = real_number(dt, "dt", SettingsError, "give the sample time of the controller in s, > 0")
         if period <= 0.0:
             raise SettingsError(f"dt is {period:g}: give the sample time of the controller in s, > 0")
+        if given.clock is not None and not math.isclose(given.clock, period, rel_tol=1e-9):
+            raise SettingsError(f"dt is {period:g} and the controller's period {given.clock:g}: give one of them, or both alike")
         return period
     if given.clock is not None:
         return given.clock
+    if result.controller is not None and result.controller.clock is not None:
+        return result.controller.clock
     if result.records:
         return result.records[0].dt
     raise SettingsError(f"the sample time of the controller is not known: a loaded result has no records; give {arg('dt')} [s]")

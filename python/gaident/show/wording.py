@@ -27,7 +27,7 @@ NOT_AS_GIVEN = {
     "other_gains": "the controller has other gains than the given ones",
 }
 """Finding -> what differs in the controller itself: the model of the axis lacks nothing by it."""
-_ANGULAR = ("frequency", "zero_frequency")  # angular frequencies in rad/s, which are read in Hz
+_ANGULAR = ("frequency", "zero_frequency", "bandwidth")  # where they are in rad/s: they are read in Hz
 
 
 def certainty(bic: float) -> str:
@@ -133,7 +133,7 @@ def size_words(finding: Finding, axis: str) -> str:
     name, e = next(iter(finding.parameters.items()), ("", None))
     if e is None or not e.identifiable or not math.isfinite(e.value) or e.unit == "1":
         return ""
-    if name in _ANGULAR:
+    if name in _ANGULAR and e.unit == "rad/s":
         return f"{number(e.value / math.tau, 3)} Hz"
     value, u = (1e3 * e.value, "ms") if e.unit == "s" else (e.value, unit(e.unit, axis))
     return f"{number(value, 3)} {u}"

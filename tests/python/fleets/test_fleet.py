@@ -24,7 +24,7 @@ from gaident.errors import SettingsError
 from gaident.fleets import dataset, engine
 from gaident.fleets.names import names_of
 from gaident.fleets.task import Job
-from places import PACKAGE, ROOT
+from places import ROOT
 
 fleet = importlib.import_module("gaident.fleets.fleet")
 identified = partial(ga.fleet, "logs/**/*.csv", method="identify", temperature="heat")
@@ -115,7 +115,8 @@ def test_other_settings_and_other_content_are_other_results(tmp_path: Path, monk
 def test_a_killed_run_goes_on_to_the_same_dataset(inside: Path) -> None:
     script = inside / "run.py"
     script.write_text(RUN)
-    with subprocess.Popen([sys.executable, str(script)], env={**os.environ, "PYTHONPATH": str(PACKAGE.parent)}) as run:
+    installed = {**os.environ, "PYTHONPATH": str(Path(ga.__file__).parents[1])}
+    with subprocess.Popen([sys.executable, str(script)], env=installed) as run:
         until = time.monotonic() + 60.0
         while not list((inside / "killed").rglob("*.json")):
             assert time.monotonic() < until and run.poll() is None
@@ -148,8 +149,8 @@ def test_a_killed_worker_costs_nothing(inside: Path) -> None:
 
 def test_ctrl_c_keeps_what_is_done(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
-    for day in range(10, 30):
-        write_log(tmp_path / "logs" / "x" / f"2026-01-{day}.csv", day)
+    for day in range(150):  # far more than are done when it comes
+        write_log(tmp_path / "logs" / "x" / f"2026-{1 + day // 28:02}-{1 + day % 28:02}.csv", day)
     interrupted(["fleet", "logs/x/*.csv", "--loop", "open", "--out", "out", "--workers", "1"], after=5.0)
     done = len(list(Path("out/results").rglob("*.json")))
     rows = list(fleet.kept_fleet("out").rows()) if done else []

@@ -66,7 +66,8 @@ LINEAR = re.compile(
 # Angular frequencies and the angle of a period are rad on either axis.
 ANGULAR = re.compile(
     r"(?:real|imaginary) parts? (?:\[rad/s\]|\S+(?: to \S+)? rad/s)|\[rad/s\] frequency|frequency \[rad/s\]|"
-    r"phase +\S+(?: (?:\+-|±) \S+)? +rad\b|frequency +\S+(?: (?:\+-|±) \S+)? +rad/s|(?:pole|zero) +\S+(?: \S+j)? rad/s"
+    r"phase +\S+(?: (?:\+-|±) \S+)? +rad\b|(?:frequency|bandwidth) +\S+(?: (?:\+-|±) \S+)? +rad/s|"
+    r"(?:pole|zero) +\S+(?: \S+j)? rad/s"
 )
 CONVERTED = re.compile(r"\bturns?\b|degrees|orders? ")  # a number of turns, of degrees, per turn: of metres, per metre
 NUMBER = re.compile(r"(?<![\w^.])[-+]?\d+(?:\.\d+)?(?:e[-+]?\d+)?")
@@ -112,7 +113,7 @@ def test_a_sentence_is_copied_and_saved_with_both_its_forms() -> None:
 
 def test_units_and_words_of_both() -> None:
     assert [unit(u, "linear") for u in ga.TwoMass.UNITS.values()][:5] == ["kg", "N s/m", "kg", "N s/m", "N/m"]
-    units = {p.unit for row in ga.effects.table() for p in row.parameters} - {"1", "s", "1/s"}
+    units = {p.unit for row in ga.effects.table() for p in row.parameters} - {"1", "s", "1/s", "Hz"}
     assert units <= set(UNITS), "every unit of an effect has its like on a linear axis"
     assert unit("of one's own", "linear") == "of one's own" and unit("N m", "rotary") == "N m"
     assert unit("rad/s^3/(N m)", "linear") == "m/s^3/N"

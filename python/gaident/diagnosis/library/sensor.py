@@ -44,7 +44,7 @@ CAUSES: tuple[Cause, ...] = (
         lambda s: tuple(np.geomspace(0.12, 6.0, 6) / s.log_dt),
         seen_angle=_behind_observer,
         excludes=OTHERS["velocity_observer"],
-        needs=(t.moves,),
+        needs=(t.moves, t.every_sample, t.torque_logged),
         excited_by=("random signal at speed",),
     ),
     single(

@@ -126,6 +126,12 @@ def every_sample(s: Motions) -> Text | None:
     return None if one else Text("the log has fewer lines than the controller has samples")
 
 
+def torque_logged(s: Motions) -> Text | None:
+    """The torque is logged: without it a limit in the controller makes a motion late, too."""
+    logged = all(m.logged for m in s.records)
+    return None if logged else say("no {torque} is logged: what is late in the controller looks the same")
+
+
 def on_a_lattice(s: Motions) -> Text | None:
     """The velocities are whole numbers of a step, as the differences of an encoder's counts are."""
     if all(lattice_step(m.velocity) > 0.0 for m in s.records):

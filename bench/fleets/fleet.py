@@ -1,9 +1,9 @@
 """Fleets: false alarms, recall and delay of changes; a small fleet of real diagnoses; speed and memory.
 
-    python bench/fleet.py courses 400          so many simulated axis-years of each kind of course, daily logs
-    python bench/fleet.py drives 6             so many simulated axes with 40 logs each, diagnosed, one of them changed
-    python bench/fleet.py speed 24             so many logs one after the other, and by 1 and 2 processes
-    python bench/fleet.py memory 3000          so many tasks that are done at once: what the parent keeps of each
+    python bench/fleets/fleet.py courses 400          so many simulated axis-years of each kind of course, daily logs
+    python bench/fleets/fleet.py drives 6             so many simulated axes with 40 logs each, diagnosed, one of them changed
+    python bench/fleets/fleet.py speed 24             so many logs one after the other, and by 1 and 2 processes
+    python bench/fleets/fleet.py memory 3000          so many tasks that are done at once: what the parent keeps of each
 
 Figures stand in bench/README.md. --workers N bounds the processes.
 """
@@ -23,10 +23,10 @@ from pathlib import Path
 
 import numpy as np
 
-HERE = Path(__file__).resolve().parent
+HERE = Path(__file__).resolve().parents[1]
 sys.path[:0] = [str(HERE), str(HERE.parent / "tests" / "python" / "support")]
 
-from rows.courses import DAYS, KINDS_OF_COURSE, course_of  # noqa: E402
+from rows.made.courses import DAYS, KINDS_OF_COURSE, course_of  # noqa: E402
 
 import gaident as ga  # noqa: E402
 from drive_rig import Noise, Plant, rig  # noqa: E402
