@@ -80,7 +80,7 @@ def retune(
     phase_margin : float
         Least phase margin of the velocity loop, and of the position loop where there is one [deg], above 0 and below 90.
     gain_margin : float
-        Least gain margin [dB], above 0 and at most 40.
+        Least gain margin [dB], above 0 and below 40.
     torque_limit : float, optional
         Largest torque that a step of the velocity command of the size `step` may ask for [N m]; None: that of the controller,
         or none where it has no limit.
@@ -380,7 +380,7 @@ def _asked(
 
 
 def _step_of(result: Identification | Diagnosis) -> float:
-    jumps = [float(np.max(np.abs(np.diff(r.command, prepend=0.0)))) for r in result.records if r.command is not None]
+    jumps = [float(np.max(np.abs(np.diff(r.command, prepend=r.velocity[0])))) for r in result.records if r.command is not None]
     return max(jumps, default=0.0) or 1.0
 
 

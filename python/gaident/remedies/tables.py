@@ -6,6 +6,7 @@ import csv
 import io
 import math
 import os
+import re
 import textwrap
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
@@ -17,6 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from gaident.axis import called, linear_sentences, said, say, unit
 from gaident.checks import checked_path
+from gaident.errors import SettingsError
 from gaident.export.c_source import c_name
 from gaident.files import write_whole
 from gaident.remedies.c_tables import c_tables
@@ -157,7 +159,14 @@ class FeedforwardTables:
         -------
         str
             The text of the file.
+
+        Raises
+        ------
+        SettingsError
+            For a name that C does not take.
         """
+        if name is not None and not re.fullmatch(r"[A-Za-z_][A-Za-z0-9_]*", name):
+            raise SettingsError(f"name is {name!r}: give what C takes as a name, letters, digits and _")
         text = c_tables(self, name or c_name("feedforward" if path is None else checked_path(path).stem))
         if path is not None:
             write_whole(Path(path), text.encode())

@@ -108,8 +108,10 @@ def test_other_settings_and_other_content_are_other_results(tmp_path: Path, monk
     assert len(list(Path("out/results").rglob("*.json"))) == 3
     assert len(list(fleet.kept_fleet("out").rows())) == 1  # the last one counts
     log.unlink()
-    gone = ga.fleet([str(log)], method="identify", out="out", executor=map)
-    assert gone.failed == 1 and "there is no such log" in gone.first_failed()[0]
+    gone = ga.fleet(["logs/x/2026-01-01.csv"], method="identify", out="out", executor=map)
+    assert (gone.done, gone.failed, gone.there) == (1, 0, 1), "what was found of a log that was moved stays"
+    never = ga.fleet(["logs/x/2026-01-02.csv"], method="identify", out="out", executor=map)
+    assert never.failed == 1 and "there is no such log" in never.first_failed()[0]
 
 
 def test_a_killed_run_goes_on_to_the_same_dataset(inside: Path) -> None:

@@ -158,6 +158,27 @@ def test_it_is_saved_drawn_and_told(tuned: ga.Retuning, tmp_path: Path) -> None:
     assert "N/m" in tuned.summary(axis="linear") and "N m" not in tuned.summary(axis="linear")
 
 
+def test_a_difference_over_samples_is_late_in_the_loop(found: ga.Diagnosis) -> None:
+    """Over 8 samples it is 4 samples late: gains that do not know of it would leave no margin."""
+    slow = replace(found, model=LAGGED.with_effect("velocity_difference", samples=8.0), covariance=None)
+    known, plain = (ga.retune(one, phase_margin=50.0) for one in (slow, replace(found, model=LAGGED, covariance=None)))
+    delayed = LAGGED.with_effect("transport_delay", delay=4.0 * T)
+    phase, _, stable = margins_of(delayed, ga.Cascade(known.controller))
+    assert stable and phase >= 49.5
+    assert known.controller.gains.kp < 0.7 * plain.controller.gains.kp
+
+
+def test_a_changing_inertia_is_said(found: ga.Diagnosis) -> None:
+    turning = replace(found, model=LAGGED.with_effect("position_inertia", amplitude=0.5, order=1.0, phase=0.0), covariance=None)
+    assert any("inertia changes with the angle" in note for note in ga.retune(turning).notes)
+    assert any("inertia changes with the angle" in note for note in ga.feedforward(turning).notes)
+
+
+def test_one_clock(found: ga.Diagnosis) -> None:
+    with pytest.raises(ga.GaidentError, match=r"dt is 0.0001 and the controller's period 0.001"):
+        ga.retune(found, ga.Cascade(GIVEN, period=T), dt=1e-4)
+
+
 def test_a_loaded_result_needs_the_sample_time_and_the_same_seed_gives_the_same(
     found: ga.Diagnosis, tuned: ga.Retuning, tmp_path: Path
 ) -> None:
