@@ -22,6 +22,7 @@ from gaident.results.store import load
 __all__ = ["write_page"]
 
 MOST_DRAWN = 600  # no decision: drawn: pictures of a page, those with changes first
+DIGITS = 3  # no decision: drawn: of a number at an axis, at least
 WIDTH, HEIGHT, LEFT, RIGHT, TOP, BOTTOM = 300, 130, 56, 8, 8, 18  # no decision: drawn: pixels
 ROOM = 0.08  # no decision: drawn: above and below the values
 SECURITY = "default-src 'none'; style-src 'unsafe-inline'; script-src 'unsafe-inline'"
@@ -214,7 +215,8 @@ def _picture(c: Course) -> str:
     shown = low + room, high - room
     # As many digits as tell the two apart, and one more.
     size = max(map(abs, shown))
-    digits = max(3, 2 + int(np.ceil(np.log10(size / (shown[1] - shown[0]))))) if shown[1] > shown[0] and size > 0.0 else 3
+    apart = shown[1] - shown[0]
+    digits = max(DIGITS, 2 + int(np.ceil(np.log10(size / apart)))) if apart > 0.0 and size > 0.0 else DIGITS
     texts = [f'<text x="2" y="{y(v) + 3:.1f}">{v:.{digits}g}</text>' for v in shown]
     texts += [f'<text x="{LEFT}" y="{HEIGHT - 4}">{day_of(c.times[0])}</text>']
     texts += [f'<text x="{WIDTH - RIGHT}" y="{HEIGHT - 4}" text-anchor="end">{day_of(c.times[-1])}</text>']

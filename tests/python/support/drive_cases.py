@@ -316,7 +316,7 @@ def draw_effect(name: str, factor: float, plant: Plant, samples: int, rng: np.ra
         "velocity_ripple": {"amplitude": 5e-3 * factor, "order": float(rng.choice([1, 2, 4])), "phase": phase},
         "velocity_quantisation": {"step": 0.63 * factor},
         "outliers": {"fraction": max(3, round(0.002 * factor * samples)) / samples},
-        "position_inertia": {"amplitude": min(0.6, 0.2 * factor), "order": float(rng.choice([1, 2, 3])), "phase": phase},
+        "position_inertia": {"amplitude": min(0.6, 0.2 * factor), "order": float(1 + round(1e8 * phase) % 3), "phase": phase},
         "torque_hum": {"amplitude": 0.03 * factor, "frequency": float(rng.uniform(10, 50)), "phase": phase},
         "position_friction": {"torque": 0.05 * factor, "amplitude": 0.8, "order": float(rng.choice([1, 2, 3])), "phase": phase},
         # A torque of friction, beside a shaft that has as much stiffness as the element, from half of it to twice as much.

@@ -32,7 +32,7 @@ CAUSES: tuple[Cause, ...] = (
         _resonance_starts,
         lambda s: (0.1, 0.05, 0.1, 0.05),
         resonates=True,
-        excludes=frozenset({"backlash", "hardening_stiffness", "hysteretic_coupling"}),
+        excludes=frozenset({"backlash", "hardening_stiffness", "hysteretic_coupling", "position_inertia"}),
         poles=lambda v: tuple(quadratic_roots(2.0 * float(v[1]) * float(v[0]), float(v[0]) ** 2)),
         needs=(t.torque_changes,),
         excited_by=("random signal at speed",),
