@@ -16,7 +16,7 @@ from gaident.diagnosis.experiments.excitation import excitation
 from gaident.diagnosis.explain.alternatives import alternatives_of, impossible_here
 from gaident.diagnosis.explain.missing_torque import missing_torque
 from gaident.diagnosis.library import terms
-from gaident.diagnosis.library.coordinates import HIGHEST_ORDER
+from gaident.diagnosis.library.coordinates import HIGHEST_LOBE, HIGHEST_ORDER
 from gaident.diagnosis.library.equivalences import EQUIVALENT
 from gaident.diagnosis.selection.offset import Offset
 from gaident.errors import ModelError, RecordError
@@ -377,12 +377,22 @@ def test_an_axis_at_rest_shows_no_friction_of_the_family_and_no_order_up_to_the_
     family = {t.name for t in terms.LIBRARY.values() if t.family}
     assert family == {*levels, "square_root_drag"} and family <= set(excitation(still).not_testable)
     highest = {t.orders[1] for t in terms.LIBRARY.values() if t.harmonic and t.orders[1] > 1}
-    assert highest == {HIGHEST_ORDER}
+    assert highest == {HIGHEST_LOBE, HIGHEST_ORDER}
     t = DT * np.arange(2000)
-    for share, shown in ((0.99, False), (1.01, True)):  # of the travel that contains one period of the highest order
-        angle = 0.5 * share * math.tau / HIGHEST_ORDER * np.sin(20.0 * t)
-        rec = ga.Record(DT, velocity=np.gradient(angle, DT), torque=np.cos(20.0 * t), position=angle)
-        assert ("cogging" not in excitation(rec).not_testable) is shown
+    for name, order in (("cogging", HIGHEST_ORDER), ("position_inertia", HIGHEST_LOBE)):
+        for share, shown in ((0.99, False), (1.01, True)):  # of the travel that contains one period of that order
+            angle = 0.5 * share * math.tau / order * np.sin(20.0 * t)
+            rec = ga.Record(DT, velocity=np.gradient(angle, DT), torque=np.cos(20.0 * t), position=angle)
+            assert (name not in excitation(rec).not_testable) is shown
+
+
+def test_a_hum_is_not_looked_for_under_a_measured_torque() -> None:
+    t = DT * np.arange(2000)
+    moving = {"velocity": np.sin(20.0 * t), "torque": np.cos(20.0 * t)}
+    under = excitation(ga.Record(DT, **moving, torque_is="measured")).not_testable
+    assert "was measured" in under["torque_hum"]
+    commanded = ga.Record(DT, **moving, torque_is="commanded")
+    assert "torque_hum" not in excitation(commanded).not_testable
 
 
 # --- residual tests

@@ -17,6 +17,8 @@ from gaident.estimation.term import Natural, Rows
 
 HIGHEST_ORDER = 64  # no decision: what an argument may be
 """Of cogging and encoder ripple that a drive is expected to have [1/turn]."""
+HIGHEST_LOBE = 8  # no decision: what an argument may be
+"""Of a crank, an arm or a cam: how often its inertia changes in a turn [1/turn]."""
 
 Vector = NDArray[np.float64]
 Matrix = NDArray[np.float64]

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from gaident.diagnosis.library import triggers as t
 from gaident.diagnosis.library.cause import AT_THE_SHAFT, NO_REVERSAL, Cause
-from gaident.diagnosis.library.coordinates import HIGHEST_ORDER
+from gaident.diagnosis.library.coordinates import HIGHEST_LOBE, HIGHEST_ORDER
 from gaident.diagnosis.library.kinds import harmonic, tone
 from gaident.policy.table import POLICY
 
@@ -68,8 +68,8 @@ CAUSES: tuple[Cause, ...] = (
         domains=AT_THE_SHAFT,
         excludes=frozenset({"extra_resonance"}),
         least=POLICY.inertia_share,
-        orders=(1, HIGHEST_ORDER),
-        needs=(t.periodic, t.moves, t.period_of_an_order),
+        orders=(1, HIGHEST_LOBE),
+        needs=(t.periodic, t.moves, t.period_of_a_lobe),
         unseen=t.orders_beyond,
         excited_by=("random signal at speed", "speeds mixed in time"),
     ),
@@ -77,7 +77,7 @@ CAUSES: tuple[Cause, ...] = (
         "torque_hum",
         domains=frozenset({"time"}),
         orders=(1, FREQUENCIES),
-        needs=(t.one_record,),
+        needs=(t.one_record, t.torque_commanded),
         unseen=t.frequencies_beyond,
         excited_by=("slow constant speeds",),
     ),

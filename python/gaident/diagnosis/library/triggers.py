@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from gaident.axis import TURN, Text, joined, order, say, turns
 from gaident.control.controller import Controller
 from gaident.data.signals.lattice import lattice_step
-from gaident.diagnosis.library.coordinates import HIGHEST_ORDER
+from gaident.diagnosis.library.coordinates import HIGHEST_LOBE, HIGHEST_ORDER
 from gaident.models.model import Model
 from gaident.policy.table import POLICY
 
@@ -111,6 +111,12 @@ def one_record(s: Motions) -> Text | None:
     return None if len(s.records) == 1 else Text("its phase is another one in each record: give one record alone")
 
 
+def torque_commanded(s: Motions) -> Text | None:
+    """No torque was measured: its noise, and the friction that a model lacks, make a free run drift in waves of any frequency."""
+    measured = any(m.measured for m in s.records)
+    return say("the {torque} was measured: a free run under it drifts in waves of any frequency") if measured else None
+
+
 def moves(s: Motions) -> Text | None:
     """The axis moves."""
     return None if any(np.any(m.moving) for m in s.records) else Text("the axis does not move")
@@ -189,7 +195,16 @@ def part_of_a_turn(s: Motions) -> Text | None:
 
 def period_of_an_order(s: Motions) -> Text | None:
     """The travel contains a period of the highest order that a drive is expected to have."""
-    highest = HIGHEST_ORDER * _per_turn(s)
+    return _period_of(HIGHEST_ORDER, s)
+
+
+def period_of_a_lobe(s: Motions) -> Text | None:
+    """The travel contains a period of the highest order that the inertia of a mechanism is expected to have."""
+    return _period_of(HIGHEST_LOBE, s)
+
+
+def _period_of(order_: int, s: Motions) -> Text | None:
+    highest = order_ * _per_turn(s)
     if s.travel < TURN / highest:
         return say("{} contain no period of order {} or less", _reach(s), order(highest))
     return None
