@@ -14,9 +14,14 @@ from pathlib import Path
 
 from gaident.checks import checked_path
 
-__all__ = ["write_whole"]
+__all__ = ["check_writable", "write_whole"]
 
 _PREFIX, _SUFFIX = ".gaident-", ".part"
+
+
+def check_writable(path: str | os.PathLike[str]) -> None:
+    """Raise what `write_whole` would raise for this path, before the work whose result is written there."""
+    _place(path)
 
 
 def write_whole(path: str | os.PathLike[str], content: bytes) -> None:
@@ -41,16 +46,10 @@ def write_whole(path: str | os.PathLike[str], content: bytes) -> None:
     GaidentError
         Where `path` is no path.
     """
-    given = checked_path(path)
-    found = _stat_of(given)
+    target, found = _place(path)
     if found is not None and not stat.S_ISREG(found.st_mode):
-        _write_in_place(given, found.st_mode, content)
+        _write_in_place(target, content)
         return
-    target = Path(os.path.realpath(given))
-    if not target.parent.is_dir():
-        raise FileNotFoundError(f"cannot write {target}: there is no folder {target.parent}; create it first")
-    if found is not None and not (found.st_mode & 0o222 and os.access(target, os.W_OK)):
-        raise PermissionError(errno.EACCES, "the file is write-protected; choose another name, or allow writing", str(target))
     _remove_leftovers(target.parent)
     with _temporary(target.parent, 0o666 if found is None else 0o600) as (descriptor, temporary):
         if found is not None:
@@ -64,6 +63,24 @@ def write_whole(path: str | os.PathLike[str], content: bytes) -> None:
         _sync_folder(target.parent)
 
 
+def _place(path: str | os.PathLike[str]) -> tuple[Path, os.stat_result | None]:
+    """Where the content goes, behind links, and what stands there; raises where nothing can be written."""
+    given = checked_path(path)
+    found = _stat_of(given)
+    if found is not None and not stat.S_ISREG(found.st_mode):
+        if stat.S_ISDIR(found.st_mode):
+            raise IsADirectoryError(errno.EISDIR, "this is a folder; name a file in it", str(given))
+        if not (stat.S_ISCHR(found.st_mode) or stat.S_ISFIFO(found.st_mode)):
+            raise OSError(errno.EINVAL, "this is no file, pipe or character device; name a file", str(given))
+        return given, found
+    target = Path(os.path.realpath(given))
+    if not target.parent.is_dir():
+        raise FileNotFoundError(f"cannot write {target}: there is no folder {target.parent}; create it first")
+    if found is not None and not (found.st_mode & 0o222 and os.access(target, os.W_OK)):
+        raise PermissionError(errno.EACCES, "the file is write-protected; choose another name, or allow writing", str(target))
+    return target, found
+
+
 def _stat_of(path: Path) -> os.stat_result | None:
     """What stands at the path, behind links; None: nothing yet."""
     try:
@@ -72,11 +89,7 @@ def _stat_of(path: Path) -> os.stat_result | None:
         return None
 
 
-def _write_in_place(path: Path, mode: int, content: bytes) -> None:
-    if stat.S_ISDIR(mode):
-        raise IsADirectoryError(errno.EISDIR, "this is a folder; name a file in it", str(path))
-    if not (stat.S_ISCHR(mode) or stat.S_ISFIFO(mode)):
-        raise OSError(errno.EINVAL, "this is no file, pipe or character device; name a file", str(path))
+def _write_in_place(path: Path, content: bytes) -> None:
     # Without waiting, a pipe that nobody reads is an error and not a wait without end.
     descriptor = os.open(path, os.O_WRONLY | os.O_NONBLOCK | os.O_NOCTTY)
     try:

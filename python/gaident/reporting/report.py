@@ -16,7 +16,7 @@ from gaident.control.pi import bare_pi
 from gaident.data.record import Record
 from gaident.diagnosis.explain.evidence import velocity_curve
 from gaident.errors import GaidentError
-from gaident.files import write_whole
+from gaident.files import check_writable, write_whole
 from gaident.identification.frequency import response_of
 from gaident.reporting.runs import run_of
 from gaident.results.diagnosis import Diagnosis
@@ -95,6 +95,7 @@ def report(
     >>> "<html" in pathlib.Path("report.html").read_text(encoding="utf-8")
     True
     """
+    check_writable(path)
     write_whole(path, report_page(result, records, validation, axis, units, about, live).encode())
 
 
