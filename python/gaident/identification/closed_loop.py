@@ -73,7 +73,8 @@ def looped_over(records: Sequence[Record], controller: Controller | None, space:
     given = list(driven.records)
     if controller is not None and driven.loop is None:
         given = [r.with_channels(command=None, position_command=None) for r in given]
-    given = given if driven.slower or driven.loop is not None else [as_old_as_its_velocity(r) for r in given]
+    if driven.loop is None:
+        given = [as_old_as_its_velocity(r, 1 if controller is None else controller.log_every(r.dt)) for r in given]
     return Looped(given, driven.loop, (*driven.notes, *driven.doubts, *doubts))
 
 

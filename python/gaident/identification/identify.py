@@ -29,6 +29,7 @@ from gaident.identification.replay.notes import replay_notes
 from gaident.identification.replay.timed_record import plain_of
 from gaident.identification.selection import Candidate
 from gaident.messages import Message
+from gaident.models.drive_torque import as_differenced
 from gaident.models.mechanics import mechanics_from_model
 from gaident.models.model import Model
 from gaident.models.search_space import SearchSpace
@@ -120,7 +121,8 @@ def identify(
     (1, 0, 0.01, 0.05, False)
     """
     began = time.perf_counter()
-    checked = checked_records(rec, controller)
+    recorded = checked_records(rec, controller)
+    checked = [as_differenced(r, controller, looped=bare_pi(controller) is not None) for r in recorded]
     numbers = with_estimates(checked, controller).trusted()
     settings = Settings() if settings is None else settings
     if not isinstance(settings, Settings):
@@ -130,7 +132,7 @@ def identify(
     check_numbers(trials, seed, workers, progress)
     check_arithmetic(settings, loop)
     threads = processors() if workers is None else int(workers)
-    digests = distinct(given)
+    digests = distinct(recorded)
     # Sums must not depend on the order given.
     order = sorted(range(len(given)), key=lambda i: (digests[i], given[i].name))
     records, digests = [given[i] for i in order], [digests[i] for i in order]

@@ -13,7 +13,7 @@ from gaident.control.controller import Controller
 from gaident.control.pi import PI
 from gaident.control.pi_torque import pi_block
 from gaident.data.record import Record
-from gaident.data.signals.difference import is_backward_difference
+from gaident.data.signals.difference import difference_at_clock, is_difference_at_clock, is_difference_of_lines
 from gaident.data.torque_kind import MEAN, SAMPLE
 from gaident.errors import RecordError
 from gaident.models.held_torque import held_mean
@@ -123,15 +123,30 @@ def _at_its_clock(rec: Record, torque: Vector, controller: Controller, stored: f
     return _straight(rec, torque, every)
 
 
-def as_old_as_its_velocity(rec: Record) -> Record:
-    """The record with a torque that is half a sample late where its velocity is the difference of its last two positions.
+def as_differenced(rec: Record, controller: Controller | None, looped: bool = False) -> Record:
+    """The record with the velocity that its controller forms of its position, where the log's is a difference of its lines.
+
+    That one is another velocity: the mean over the line before it, of several samples of the controller, or over two lines.
+    looped: for a simulated loop that knows no age of a velocity: the difference over two lines, which has none.
+    """
+    if rec.position is None or not is_difference_of_lines(rec.velocity, rec.position, rec.dt):
+        return rec
+    every = 1 if controller is None else controller.log_every(rec.dt)
+    velocity = np.gradient(rec.position, rec.dt) if looped else difference_at_clock(rec.position, rec.dt, every)
+    return rec.with_channels(velocity=velocity)
+
+
+def as_old_as_its_velocity(rec: Record, every: int) -> Record:
+    """The record with a torque that is half a sample late where its velocity is the difference of the last two positions.
+
+    every: samples of the controller for each line.
 
     Such a velocity is the mean over the last sample: under that torque a linear model gives it to second order in dt.
     """
-    if rec.torque is None or not is_backward_difference(rec.velocity, rec.position, rec.dt):
+    if rec.torque is None or not is_difference_at_clock(rec.velocity, rec.position, rec.dt, every):
         return rec
     before = rec.torque[0] if starts_moving(rec, None) else 0.0
-    return rec.with_channels(torque=late(rec.torque, HALF, before))
+    return rec.with_channels(torque=late(rec.torque, HALF / every, before))
 
 
 def made_by(rec: Record, controller: Controller) -> Vector:

@@ -15,7 +15,12 @@ from numpy.typing import NDArray
 import gaident as ga
 from drive_rig import Plant, run_drive, skip_without_library
 from gaident.cli.main import main
-from gaident.data.signals.difference import backward_difference, is_backward_difference
+from gaident.data.signals.difference import (
+    backward_difference,
+    difference_at_clock,
+    is_difference_at_clock,
+    is_difference_of_lines,
+)
 from gaident.identification.replay.replay import replay
 
 DT = 0.5e-3
@@ -70,9 +75,11 @@ def read(path: Path) -> ga.Record:
 def test_the_velocity_is_the_difference_that_the_drive_forms_and_the_note_says_what_is_not_known(tmp_path: Path) -> None:
     rec = read(log_of(tmp_path))
     assert rec.position is not None and rec.torque is None and rec.command is None
-    assert is_backward_difference(rec.velocity, rec.position, rec.dt)
-    assert not is_backward_difference(ga.differentiate(rec.position, rec.dt), rec.position, rec.dt)
-    assert not is_backward_difference(rec.velocity, None, rec.dt)
+    assert is_difference_at_clock(rec.velocity, rec.position, rec.dt, 1)
+    assert not is_difference_at_clock(ga.differentiate(rec.position, rec.dt), rec.position, rec.dt, 1)
+    assert not is_difference_at_clock(rec.velocity, None, rec.dt, 1)
+    assert is_difference_of_lines(ga.differentiate(rec.position, rec.dt), rec.position, rec.dt)
+    assert not is_difference_of_lines(ga.differentiate(rec.position, rec.dt, cutoff_hz=200.0), rec.position, rec.dt)
     np.testing.assert_allclose(backward_difference(np.array([0.0, 1.0, 3.0]), 0.5), [2.0, 2.0, 4.0])
     assert any("Neither velocity nor torque is logged" in note and "filters" in note for note in rec.notes)
 
@@ -172,3 +179,72 @@ def test_the_law_of_a_robots_joint_is_a_cascade_without_an_integral(kp: float, k
     expected = kp * (target - run.position) + kd * (slope - run.velocity)
     np.testing.assert_allclose(run.torque[:-1], expected[:-1], atol=1e-9 * np.abs(expected).max())
     assert np.abs(run.velocity).max() > 0.1
+
+
+# Position command, position and torque: the velocity is that which the drive formed at its own clock.
+T, SERVO = 250e-6, ga.Cascade(ga.PI(0.3, 15.0), 250e-6, position=ga.P(30.0), velocity_feedforward=1.0)
+LSB = 2.0 * np.pi / 2**20
+
+
+def moves(seconds: float) -> NDArray[np.float64]:
+    """Trapezoids of the velocity at the controller's samples [rad]."""
+    speeds = np.repeat([0.0, 60.0, 120.0, 25.0, -50.0, -120.0, -35.0, 0.0, 40.0, 0.0], round(seconds / T / 10.0))
+    speed, slope = np.zeros(len(speeds)), 1500.0 * T
+    for n in range(1, len(speed)):
+        speed[n] = speed[n - 1] + np.clip(speeds[n] - speed[n - 1], -slope, slope)
+    return np.concatenate([[0.0], np.cumsum(speed[:-1])]) * T
+
+
+def servo_log(every: int, effects: dict[str, dict[str, float]], **load: float) -> ga.Record:
+    skip_without_library()
+    axis = Plant(J=1.5e-3, D=2e-3, kp=0.3, ki=15.0, dt=every * T, cascade=SERVO, **load)
+    command = moves(2.0)
+    log = run_drive(axis, command, effects, encoder=LSB, differenced=True)
+    position, wanted, torque = (
+        x[::every] for x in (LSB * np.floor(np.asarray(log.position) / LSB), command, np.asarray(log.torque))
+    )
+    velocity = ga.differentiate(position, every * T)
+    return ga.Record(every * T, velocity=velocity, position=position, position_command=wanted, torque=torque)
+
+
+@pytest.mark.parametrize("every", [1, 4, 8])
+def test_a_velocity_made_of_the_position_is_that_which_the_drive_read(every: int) -> None:
+    t = T * np.arange(2000)
+    position = 3.0 * np.sin(40.0 * t) + 0.5 * np.sin(170.0 * t)
+    read = backward_difference(position, T)[::every]
+    made = difference_at_clock(position[::every], every * T, every)
+    lines = backward_difference(position[::every], every * T)
+    inside = slice(5, -5)
+    assert every == 1 or np.abs(made - read)[inside].max() < 1e-3 * np.abs(lines - read)[inside].max()
+    assert is_difference_at_clock(made, position[::every], every * T, every)
+    outlier = np.arange(len(made)) == 40
+    moved = np.where(outlier, made + 1.0, made)
+    assert not is_difference_at_clock(moved, position[::every], every * T, every)
+    assert is_difference_at_clock(moved, position[::every], every * T, every, ~outlier)
+
+
+@pytest.mark.parametrize("every", [1, 4])
+def test_friction_of_a_log_of_position_and_torque_is_named_alone(every: int) -> None:
+    """A mean over the line before it, or over two, is no velocity of this drive: names of couplings and resonances followed."""
+    rec = servo_log(every, {"coulomb_friction": {"torque": 0.3}})
+    dia = ga.diagnose(rec, SERVO)
+    assert dia.verdict == "explained" and [f.effect for f in dia.findings if f.place != "controller"] == ["coulomb_friction"]
+    assert dia.causes[0].alternatives == () and dia.causes[0].parameters["torque"].value == pytest.approx(0.3, rel=2e-3)
+    assert dia.mechanics["inertia"].value == pytest.approx(1.5e-3, rel=1e-3) and "load_inertia" not in dia.mechanics
+    assert any("half a sample" in note and "old (0.125 ms)" in note for note in dia.notes)
+    assert dia.digests == (rec.digest,) and dia.records == (rec,)
+
+
+def test_two_masses_of_such_a_log_are_no_finding() -> None:
+    rec = servo_log(4, {}, JL=1e-3, DL=1e-3, KG=300.0, DG=0.02)
+    dia = ga.diagnose(rec, SERVO)
+    assert dia.verdict == "adequate" and not dia.causes
+    for name, value in {"motor_inertia": 1.5e-3, "load_inertia": 1e-3, "stiffness": 300.0}.items():
+        assert dia.mechanics[name].value == pytest.approx(value, rel=2e-3)
+
+
+def test_an_identification_keeps_the_digest_of_a_log_whose_velocity_it_made_anew() -> None:
+    rec = servo_log(1, {})
+    idn = ga.identify(rec.with_channels(command=None, position_command=None), settings=ga.Settings(generations=3, population=20))
+    assert idn.digests == (rec.with_channels(command=None, position_command=None).digest,)
+    assert pytest.approx(1.5e-3, rel=1e-3) == idn.mechanics.J

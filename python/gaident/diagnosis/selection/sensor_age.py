@@ -36,7 +36,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gaident.axis import TURN, Text, say
-from gaident.data.signals.difference import is_backward_difference
+from gaident.data.signals.difference import is_difference_at_clock
 from gaident.data.signals.lattice import encoder_lines, encoder_step
 from gaident.diagnosis.library.terms import LIBRARY
 from gaident.diagnosis.selection.bases import Task
@@ -93,22 +93,23 @@ def searched(
         late = ", or it was filtered or written late on its way into the log" if data.torque_measured else ""
         asked = "Log every sample." if controller is None else "Give the controller's period, or log every sample."
         return found, [say(text, 1e3 * used * data.dt, late, 1e3 * HALF * data.dt, asked)]
-    if every == 1 and all(is_backward_difference(r.velocity, r.position, data.dt) for r in data.records):
+    age = 1e3 * HALF * data.dt / every
+    read = np.split(objective.weight > 0.0, np.cumsum(data.lengths)[:-1])
+    if all(is_difference_at_clock(r.velocity, r.position, data.dt, every, at) for r, at in zip(data.records, read, strict=True)):
         text = (
-            "The velocity is the difference of the last two {angles}: half a sample old ({:.3g} ms). The simulation has it; "
+            "The velocity is the difference of the last two {angles}: half a sample{} old ({:.3g} ms). The simulation has it; "
             "it is no finding."
         )
-        older = Objective(data.aged(HALF), objective.weight, counter=objective.counter)
-        return search(older, most, None), [say(text, 1e3 * HALF * data.dt)]
+        older = Objective(data.aged(HALF / every), objective.weight, counter=objective.counter)
+        return search(older, most, None), [say(text, " of the controller" if every > 1 else "", age)]
     # Between the lines of a log whose torque does not follow from its controller, the torque may go on; not where
     # that was given a sample time, and the log has a line for each of its samples.
     going_on = (-HALF,) if every == 1 and controller is not None and data.torque_logged and not data.known_between else ()
     if going_on:
         objective = Objective(data.aged(0.0, going_on), objective.weight, counter=objective.counter)
-    read = data.velocity[objective.weight > 0.0]  # what stands in an outlier's place is on no lattice
-    lines = encoder_lines(read, data.dt / every, TURN if data.axis == "rotary" else 1.0)
+    shown = data.velocity[objective.weight > 0.0]  # what stands in an outlier's place is on no lattice
+    lines = encoder_lines(shown, data.dt / every, TURN if data.axis == "rotary" else 1.0)
     older = Objective(data.aged(HALF / every, (0.0, *going_on)), objective.weight, counter=objective.counter)
-    age = 1e3 * HALF * data.dt / every
     if lines and not _score(objective, scales, model) < _score(older, scales, model) - POLICY.rival_margin:
         each = Text("a turn", "a metre")
         text = (
@@ -119,7 +120,7 @@ def searched(
         return search(older, most, None), [say(text, lines, each, age)]
     found = search(objective, most, None)
     in_series = any(t.in_series for t in found.final.parameters.terms)
-    step = encoder_step(read, data.axis == "linear") if in_series else 0.0
+    step = encoder_step(shown, data.axis == "linear") if in_series else 0.0
     if not step > 0.0:
         return found, []
     # First whether fewer effects may do, unless the model itself is better so; then what the whole search ends with.
