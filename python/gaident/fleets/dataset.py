@@ -14,7 +14,7 @@ from gaident.errors import GaidentError, ReadError
 from gaident.files import write_whole
 from gaident.fleets.rows import LOG_COLUMNS, PARAMETER_COLUMNS
 
-__all__ = ["FORMATS", "TABLES", "best_format", "part_file", "parts_of", "read_part", "write_part"]
+__all__ = ["FORMATS", "TABLES", "best_format", "part_file", "parts_of", "read_part", "remove_part", "write_part"]
 
 FORMATS = ("parquet", "csv")
 TABLES = {"logs": LOG_COLUMNS, "parameters": PARAMETER_COLUMNS}
@@ -40,6 +40,15 @@ def write_part(folder: Path, table: str, axis: str, month: str, rows: Iterable[R
     rows = list(rows)
     content = _parquet(columns, rows) if kind == FORMATS[0] else _csv({"axis": axis, "month": month}, columns, rows)
     write_whole(target, content)
+
+
+def remove_part(folder: Path, table: str, axis: str, month: str, kind: str) -> None:
+    """Remove one file of a table, and its folders where nothing else is in them. Raises OSError."""
+    file = part_file(folder, table, axis, month, kind)
+    file.unlink(missing_ok=True)
+    for above in (file.parent, file.parent.parent):
+        if above.is_dir() and not any(above.iterdir()):
+            above.rmdir()
 
 
 def _parquet(columns: Mapping[str, type], rows: list[Row]) -> bytes:

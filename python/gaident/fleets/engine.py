@@ -43,7 +43,11 @@ def outcomes(task: FleetTask, jobs: Iterable[Job], executor: object, workers: in
 
 def _by_map(work: Work, jobs: Iterator[Job], mapped: Callable[..., Iterable[Outcome]]) -> Generator[Outcome, None, None]:
     while window := list(islice(jobs, POLICY.tasks_under_way)):
-        yield from mapped(work, window)
+        made = mapped(work, window)
+        for outcome in made if isinstance(made, Iterable) else [made]:
+            if not isinstance(outcome, Outcome):
+                raise SettingsError(f"executor gives {outcome!r:.80}: give a function like map, or an Executor")
+            yield outcome
 
 
 def _by_executor(work: Work, jobs: Iterator[Job], executor: Any) -> Generator[Outcome, None, None]:

@@ -7,22 +7,21 @@ import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import closing
 from dataclasses import dataclass
-from datetime import datetime, timezone
 from itertools import islice
 from pathlib import Path
 from typing import Any
 
 from gaident.axis import checked_axis
-from gaident.checks import checked_path, known_keys, one_of, yes_or_no
+from gaident.checks import above_zero, checked_path, known_keys, one_of, yes_or_no
 from gaident.control.controller import Controller, checked_controller
 from gaident.drive.drive_file import Drive, read_drive_file, unfilled_of
 from gaident.errors import SettingsError
 from gaident.files import write_whole
-from gaident.fleets.dataset import TABLES, best_format, part_file, parts_of, read_part, write_part
+from gaident.fleets.dataset import TABLES, best_format, part_file, parts_of, read_part, remove_part, write_part
 from gaident.fleets.engine import outcomes
 from gaident.fleets.index import Index, opened, result_path
-from gaident.fleets.names import Names, names_of, paths_of
-from gaident.fleets.task import METHODS, FleetTask, Job, Outcome, content_of
+from gaident.fleets.names import Names, named_logs, names_of
+from gaident.fleets.task import METHODS, FleetTask, Job, Outcome, content_of, shown
 
 __all__ = ["Fleet", "fleet", "kept_fleet"]
 
@@ -215,7 +214,7 @@ def fleet(
         kind = index.about("format")
         if kind is None:
             index.keep("format", kind := best_format())
-        run = _Run(index, folder, task, resume, progress, index.list_logs(_named(logs, named)))
+        run = _Run(index, folder, task, resume, progress, index.list_logs(named_logs(logs, named)))
         try:
             with closing(outcomes(task, run.jobs(), executor, workers)) as ended:
                 for outcome in ended:
@@ -254,12 +253,19 @@ def _task(
         raise SettingsError(f"seed is {seed!r}: give a whole number from 0 on")
     if temperature is not None and not isinstance(temperature, str):
         raise SettingsError(f"temperature is {temperature!r:.80}: give the name of the column with the temperature, or None")
-    if noise is not None and (isinstance(noise, (bool, str)) or not noise > 0.0):
-        raise SettingsError(f"noise is {noise!r:.80}: give its standard deviation in rad/s, above 0, or None")
+    if temperature == "":
+        raise SettingsError("temperature is '': give the name of the column with the temperature, or None")
+    if noise is not None:
+        noise = above_zero(noise, "noise", SettingsError, "give its standard deviation in rad/s, above 0, or None")
+    if pitch is not None:
+        pitch = above_zero(pitch, "pitch", SettingsError, "give the length with which cogging returns in m, above 0, or None")
     given = None if drive is None else drive if isinstance(drive, Drive) else _drive(checked_path(drive, "drive", SettingsError))
     if given is not None and (controller is not None or read is not None):
         raise SettingsError("drive is given beside controller or read: the drive file says both; leave these out")
     reading = known_keys({} if read is None else read, "read", READING, (), SettingsError)
+    for name, value in reading.items():
+        if not _is_plain(value):
+            raise SettingsError(f"read: {name} is {value!r:.80}: give text, numbers, or mappings and lists of them")
     used = given.controller() if given is not None else checked_controller(controller)
     kind = given.axis if given is not None else checked_axis(axis)
     more: dict[str, Any] = {}
@@ -272,27 +278,21 @@ def _task(
     return FleetTask(method, used, kind, given, reading, more, temperature, seed)
 
 
+def _is_plain(value: object) -> bool:
+    """Whether a value can be sent to a process, and its digest is the same tomorrow."""
+    if isinstance(value, Mapping):
+        return all(isinstance(name, str) and _is_plain(part) for name, part in value.items())
+    if isinstance(value, (list, tuple)):
+        return all(_is_plain(part) for part in value)
+    return value is None or isinstance(value, (str, bool, int, float))
+
+
 def _drive(path: Path) -> Drive:
     """A drive file of one axis, whose settings all axes have."""
     s = read_drive_file(str(path))
     about = {key: value for key, value in s["report"].items() if value}
     parts = (s[""], s["columns"], s["units"], s["controller"], s["space"], s["limits"], s["shift"], s["show"], about)
     return Drive(*parts, unfilled_of(str(path)))
-
-
-def _named(logs: object, named: Names) -> Iterator[tuple[str, str, str]]:
-    """(path, axis, time) of each log; raises SettingsError where a function gives something else."""
-    found = False
-    for path in paths_of(logs):
-        found = True
-        given = named(path)
-        if not (isinstance(given, tuple) and isinstance(given[0], str) and given[0] and isinstance(given[-1], datetime)):
-            raise SettingsError(f"names gives {given!r:.80} for {path}: return the name of the axis and a datetime")
-        axis, when = given
-        utc = when.astimezone(timezone.utc) if when.tzinfo is not None else when
-        yield path, axis, utc.strftime("%Y-%m-%dT%H:%M:%S")
-    if not found:
-        raise SettingsError("logs is empty: give a pattern such as 'logs/**/*.csv', or a list of paths")
 
 
 class _Run:
@@ -309,14 +309,14 @@ class _Run:
 
     def jobs(self) -> Iterator[Job]:
         """The logs that have no result; the result of each other one is entered."""
-        for path in self.index.paths():
+        for file, path in self.index.logs():
             content, why = _content(path)
-            if not content and self.index.done_before(path):  # moved away since: what was found of it stays
+            if not content and self.index.done_before(file):  # moved away since: what was found of it stays
                 self.there += 1
                 self._count("done")
                 continue
-            key = self.task.key(content or path, path)
-            self.index.key_of(path, content, self.settings, self.task.version, key)
+            key = self.task.key(content or shown(file), path)
+            self.index.key_of(file, content, self.settings, self.task.version, key)
             if not content:
                 self.keep(Outcome(path, key, "lost", why))
             elif (status := self.index.known(key, self.resume)) is not None:
@@ -360,6 +360,11 @@ def _written(index: Index, folder: Path, kind: str) -> None:
 
     for axis, month in index.stale(there):
         rows = list(index.part(axis, month))
+        if not rows:  # its logs have other names now
+            for table in TABLES:
+                remove_part(folder, table, axis, month, kind)
+            index.written(axis, month)
+            continue
         write_part(folder, "logs", axis, month, [row for row, _ in rows], kind)
         write_part(folder, "parameters", axis, month, [p for _, parameters in rows for p in parameters], kind)
         index.written(axis, month)

@@ -1,4 +1,8 @@
-"""What is done: a small database in the folder of a fleet, which a process that is killed at any moment leaves whole."""
+"""What is done: a small database in the folder of a fleet, which a process that is killed at any moment leaves whole.
+
+A log is a file: `file` is its path without links, whichever of its names was given, `path` the name that was given.
+Both are bytes, as a name need not be UTF-8.
+"""
 
 from __future__ import annotations
 
@@ -12,15 +16,17 @@ from pathlib import Path
 from typing import Any
 
 from gaident.errors import GaidentError
-from gaident.fleets.task import Outcome
+from gaident.fleets.task import Outcome, shown
 
 __all__ = ["Index", "opened", "result_path"]
 
 TABLES = """
 CREATE TABLE IF NOT EXISTS about (name TEXT PRIMARY KEY, value TEXT);
 CREATE TABLE IF NOT EXISTS logs (
-    path TEXT PRIMARY KEY, axis TEXT, time TEXT, content TEXT, settings TEXT, version TEXT, key TEXT, run INTEGER
+    file BLOB PRIMARY KEY, path BLOB, axis TEXT, time TEXT, content TEXT, settings TEXT, version TEXT, key TEXT, run INTEGER
 ) WITHOUT ROWID;
+CREATE INDEX IF NOT EXISTS of_file ON logs (content, file);
+CREATE INDEX IF NOT EXISTS of_run ON logs (run, path);
 CREATE INDEX IF NOT EXISTS of_part ON logs (axis, substr(time, 1, 7), time, path);
 CREATE INDEX IF NOT EXISTS of_key ON logs (key);
 CREATE TABLE IF NOT EXISTS results (key TEXT PRIMARY KEY, status TEXT, error TEXT, row TEXT, parameters TEXT, run INTEGER);
@@ -72,47 +78,64 @@ class Index:
             base.execute("INSERT OR REPLACE INTO about VALUES (?, ?)", (name, value))
 
     def list_logs(self, named: Iterable[tuple[str, str, str]]) -> int:
-        """Enter (path, axis, time) of the logs of this run; returns how many there are."""
+        """Enter (path, axis, time) of the logs of this run; returns how many there are.
+
+        Of several names of one file the first by the alphabet counts, and of several runs the last.
+        """
         with self.changed() as base:
-            for path, axis, time in named:
-                query = "SELECT axis, substr(time, 1, 7), axis = ? AND time = ? FROM logs WHERE path = ?"
-                before = base.execute(query, (axis, time, path)).fetchone()
+            for name, axis, time in named:
+                path, file = os.fsencode(name), os.fsencode(os.path.realpath(name))
+                query = "SELECT axis, substr(time, 1, 7), path, time, run FROM logs WHERE file = ?"
+                before = base.execute(query, (file,)).fetchone()
                 if before is None:
-                    values = (path, axis, time, self.run)
-                    base.execute("INSERT INTO logs (path, axis, time, run) VALUES (?, ?, ?, ?)", values)
+                    values = (file, path, axis, time, self.run)
+                    base.execute("INSERT INTO logs (file, path, axis, time, run) VALUES (?, ?, ?, ?, ?)", values)
                     continue
-                if not before[2]:
-                    base.executemany(
-                        "INSERT OR IGNORE INTO stale VALUES (?, ?)", [(before[0], before[1]), (axis, month_of(time))]
-                    )
-                base.execute("UPDATE logs SET axis = ?, time = ?, run = ? WHERE path = ?", (axis, time, self.run, path))
+                if before[4] == self.run and before[2] <= path:
+                    continue
+                if (before[0], before[2], before[3]) != (axis, path, time):
+                    parts = [(before[0], before[1]), (axis, month_of(time))]
+                    base.executemany("INSERT OR IGNORE INTO stale VALUES (?, ?)", parts)
+                changed = (path, axis, time, self.run, file)
+                base.execute("UPDATE logs SET path = ?, axis = ?, time = ?, run = ? WHERE file = ?", changed)
             return int(base.execute("SELECT count(*) FROM logs WHERE run = ?", (self.run,)).fetchone()[0])
 
-    def paths(self) -> Iterator[str]:
-        """The logs of this run, by their names."""
-        last = ""
+    def logs(self) -> Iterator[tuple[bytes, str]]:
+        """(file, path) of the logs of this run, by their paths."""
+        last = b""
         while True:
-            query = "SELECT path FROM logs WHERE run = ? AND path > ? ORDER BY path LIMIT ?"
+            query = "SELECT file, path FROM logs WHERE run = ? AND path > ? ORDER BY path LIMIT ?"
             rows = self.base.execute(query, (self.run, last, PAGE)).fetchall()
             if not rows:
                 return
-            for (path,) in rows:
-                yield path
-            last = rows[-1][0]
+            for file, path in rows:
+                yield file, os.fsdecode(path)
+            last = rows[-1][1]
 
-    def key_of(self, path: str, content: str, settings: str, version: str, key: str) -> None:
+    def key_of(self, file: bytes, content: str, settings: str, version: str, key: str) -> None:
         """Say which result belongs to a log."""
         with self.changed() as base:
-            old = base.execute("SELECT key FROM logs WHERE path = ?", (path,)).fetchone()
+            old = base.execute("SELECT key, content FROM logs WHERE file = ?", (file,)).fetchone()
             if old is None or old[0] != key:
-                values = (content, settings, version, key, path)
-                base.execute("UPDATE logs SET content = ?, settings = ?, version = ?, key = ? WHERE path = ?", values)
-                self._stale(base, "path", path)
+                if content and not (old and old[1]):
+                    self._moved(base, file, content)
+                values = (content, settings, version, key, file)
+                base.execute("UPDATE logs SET content = ?, settings = ?, version = ?, key = ? WHERE file = ?", values)
+                self._stale(base, "file", file)
 
-    def done_before(self, path: str) -> bool:
+    def _moved(self, base: sqlite3.Connection, file: bytes, content: str) -> None:
+        """Where a new log has the content of one whose file is gone, it is that log under another name: the old name goes."""
+        query = "SELECT file FROM logs WHERE content = ? AND file <> ? AND run < ? ORDER BY file"
+        for (other,) in base.execute(query, (content, file, self.run)).fetchall():
+            if not os.path.lexists(other):
+                self._stale(base, "file", other)
+                base.execute("DELETE FROM logs WHERE file = ?", (other,))
+                return
+
+    def done_before(self, file: bytes) -> bool:
         """Whether a result of a log is there, whatever it was made of."""
-        query = "SELECT 1 FROM logs JOIN results USING (key) WHERE path = ? AND status = 'done'"
-        return self.base.execute(query, (path,)).fetchone() is not None
+        query = "SELECT 1 FROM logs JOIN results USING (key) WHERE file = ? AND status = 'done'"
+        return self.base.execute(query, (file,)).fetchone() is not None
 
     def known(self, key: str, resume: bool) -> str | None:
         """The status of a result that need not be made again; without `resume` only those of this run."""
@@ -127,7 +150,7 @@ class Index:
             base.execute("INSERT OR REPLACE INTO results VALUES (?, ?, ?, ?, ?, ?)", values)
             self._stale(base, "key", outcome.key)
 
-    def _stale(self, base: sqlite3.Connection, column: str, value: str) -> None:
+    def _stale(self, base: sqlite3.Connection, column: str, value: str | bytes) -> None:
         """Parts of the dataset that contain such logs are to be written again."""
         base.execute(
             f"INSERT OR IGNORE INTO stale SELECT DISTINCT axis, substr(time, 1, 7) FROM logs WHERE {column} = ?", (value,)
@@ -152,6 +175,7 @@ class Index:
             FROM logs JOIN results ON results.key = logs.key WHERE axis = ? AND substr(time, 1, 7) = ? ORDER BY time, path"""
         for values in self.base.execute(query, (axis, month)):
             path, time, content, settings, version, key, status, error, row, parameters = values
+            path = shown(path)
             about = {"log": path, "time": time, "result": result_path(key) if status == "done" else None}
             state = {
                 "status": "failed" if status == "lost" else status,

@@ -8,14 +8,18 @@ import re
 from collections.abc import Callable, Iterable, Iterator
 from datetime import datetime, timezone
 from pathlib import PurePath
+from urllib.parse import quote
 
 from gaident.checks import checked_path
 from gaident.errors import SettingsError
+from gaident.fleets.task import shown
 
-__all__ = ["Names", "names_of", "paths_of"]
+__all__ = ["Names", "named_logs", "names_of"]
 
 Names = Callable[[str], tuple[str, datetime]]
 """Path of a log -> (name of the axis, time of the log)."""
+
+LONGEST_NAME = 240  # no decision: a format: what a name of a folder may be
 
 _DATE = re.compile(
     r"(?<!\d)(20\d\d)[-_.]?(0[1-9]|1[0-2])[-_.]?(0[1-9]|[12]\d|3[01])"
@@ -23,7 +27,7 @@ _DATE = re.compile(
 )
 
 
-def paths_of(logs: object) -> Iterator[str]:
+def _paths_of(logs: object) -> Iterator[str]:
     """The paths that an argument means: a pattern, or paths and patterns; one after the other, in no order.
 
     Raises SettingsError for all else, and where a pattern fits no file.
@@ -68,13 +72,13 @@ def names_of(names: object) -> Names:
     def named(path: str) -> tuple[str, datetime]:
         match = pattern.search(path)
         if match is None:
-            raise SettingsError(f"names is {names!r}: it does not fit {path}; correct it, or leave that log out")
+            raise SettingsError(f"names is {names!r}: it does not fit {shown(path)}; correct it, or leave that log out")
         own = match.groupdict().get("time")
         if own is None:
             return match["axis"], _by_folder(path)[1]
         date = _DATE.search(own)
         if date is None:
-            raise SettingsError(f"names is {names!r}: its group time is {own!r} in {path}, no date like 2026-03-31T14:05")
+            raise SettingsError(f"names is {names!r}: its group time is {own!r} in {shown(path)}, no date like 2026-03-31T14:05")
         return match["axis"], _time(date, path)
 
     return named
@@ -99,4 +103,42 @@ def _time(date: re.Match[str], path: str) -> datetime:
     try:
         return datetime(year, month, day, hour, minute, second, tzinfo=timezone.utc)
     except ValueError as error:
-        raise SettingsError(f"logs: the date {date[0]!r} in {path} is none ({error}); rename the log, or give names=") from None
+        where = f"the date {date[0]!r} in {shown(path)} is none ({error})"
+        raise SettingsError(f"logs: {where}; rename the log, or give names=") from None
+
+
+def named_logs(logs: object, named: Names) -> Iterator[tuple[str, str, str]]:
+    """(path, axis, time) of each log; raises SettingsError where a function gives something else."""
+    found = False
+    for path in _paths_of(logs):
+        found = True
+        axis, when = _checked(named, path)
+        if len(quote(axis, safe="")) > LONGEST_NAME:
+            raise SettingsError(
+                f"names gives the axis {axis!r} for {shown(path)}: too long for a folder, of {LONGEST_NAME} letters at most "
+                "(one that is not ASCII counts as three and more); give names= that makes it shorter"
+            )
+        yield path, axis, when
+    if not found:
+        raise SettingsError("logs is empty: give a pattern such as 'logs/**/*.csv', or a list of paths")
+
+
+def _checked(named: Names, path: str) -> tuple[str, str]:
+    """(axis, time in UTC) that a function of names says of a log; raises SettingsError."""
+    try:
+        given = named(path)
+    except SettingsError:
+        raise
+    except Exception as error:
+        remedy = "correct the function, or leave that log out"
+        raise SettingsError(f"names raises {type(error).__name__} ({error}) for {shown(path)}: {remedy}") from error
+    remedy = "return the name of the axis and a datetime"
+    pair = isinstance(given, tuple) and len(given) == 2 and isinstance(given[0], str) and isinstance(given[1], datetime)
+    if not pair or not given[0]:
+        raise SettingsError(f"names gives {given!r:.80} for {shown(path)}: {remedy}")
+    axis, when = given
+    try:
+        utc = when if when.tzinfo is None else when.astimezone(timezone.utc)
+        return shown(axis), utc.replace(tzinfo=None).isoformat(timespec="seconds")
+    except (OverflowError, ValueError) as error:
+        raise SettingsError(f"names gives {given!r:.120} for {shown(path)} ({error}): {remedy}") from error

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import os
 from collections.abc import Callable, Mapping
 from contextlib import ExitStack
 from dataclasses import dataclass, field
@@ -24,7 +25,7 @@ from gaident.identification.identify import identify
 from gaident.processors import one_processor
 from gaident.version import version
 
-__all__ = ["METHODS", "Job", "Outcome", "FleetTask", "content_of", "lost", "perform"]
+__all__ = ["METHODS", "Job", "Outcome", "FleetTask", "content_of", "lost", "perform", "shown"]
 
 METHODS = ("diagnose", "identify")
 HERE = "{log}"
@@ -66,7 +67,7 @@ class FleetTask:
 
     def key(self, content: str, log: str) -> str:
         """Name of the result of a log: of its content, of its ending, by which its format is known, and of the settings."""
-        return _digest(f"{content} {Path(log).suffix.lower()} {self.digest}".encode())
+        return _digest(f"{content} {shown(Path(log).suffix.lower())} {self.digest}".encode())
 
 
 @dataclass(frozen=True)
@@ -101,6 +102,11 @@ def _digest(content: bytes) -> str:
     return hashlib.sha256(content).hexdigest()
 
 
+def shown(name: str | bytes) -> str:
+    """A name of a file as text that every table, message and page takes: what is not UTF-8 in it is written as \\xNN."""
+    return os.fsencode(name).decode("utf-8", "backslashreplace")
+
+
 def content_of(path: str) -> str:
     """Digest of a file's bytes; raises OSError."""
     digest = hashlib.sha256()
@@ -118,14 +124,19 @@ def perform(task: FleetTask, job: Job) -> Outcome:
             stack.enter_context(one_thread())
             return _performed(task, job)
     except GaidentError as error:
-        return Outcome(job.log, job.key, "failed", str(error).replace(job.log, HERE))
+        return Outcome(job.log, job.key, "failed", _said(error, job))
     except MemoryError:
         return lost(job, f"{HERE}: the memory was not enough; use fewer workers, or decimate the log")
     except OSError as error:
         return lost(job, f"{HERE}: cannot be read ({error.strerror or error}); check the file, and call again")
     except Exception as error:
-        why = f"internal error, please report it: {type(error).__name__}: {error}"
-        return Outcome(job.log, job.key, "failed", f"{HERE}: {why.replace(job.log, HERE)}")
+        why = f"internal error, please report it: {type(error).__name__}: {_said(error, job)}"
+        return Outcome(job.log, job.key, "failed", f"{HERE}: {why}")
+
+
+def _said(error: Exception, job: Job) -> str:
+    """A message without the log's name, as text that a table takes."""
+    return str(error).replace(job.log, HERE).encode("utf-8", "backslashreplace").decode()
 
 
 def _performed(task: FleetTask, job: Job) -> Outcome:

@@ -11,6 +11,7 @@ import subprocess
 import sys
 import time
 from concurrent.futures import ThreadPoolExecutor
+from datetime import datetime, timedelta, timezone
 from functools import partial
 from pathlib import Path
 
@@ -78,7 +79,7 @@ def test_every_log_is_a_row(inside: Path) -> None:
 def test_a_diagnosis_has_mechanics_and_friction(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     write_log(tmp_path / "logs" / "x" / "2026-01-01.csv", 1)
-    found = ga.fleet("logs", names=lambda path: ("x", fleet.datetime(2026, 1, 1)), out="one", executor=map)
+    found = ga.fleet("logs", names=lambda path: ("x", datetime(2026, 1, 1)), out="one", executor=map)
     assert found.failed == 1  # a folder is no log
     found = ga.fleet("logs/x/*", out="one", quick=True, executor=map)
     assert found.done == 1
@@ -112,6 +113,51 @@ def test_other_settings_and_other_content_are_other_results(tmp_path: Path, monk
     assert (gone.done, gone.failed, gone.there) == (1, 0, 1), "what was found of a log that was moved stays"
     never = ga.fleet(["logs/x/2026-01-02.csv"], method="identify", out="out", executor=map)
     assert never.failed == 1 and "there is no such log" in never.first_failed()[0]
+
+
+def test_one_file_is_one_log_whatever_it_is_called(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    log = tmp_path / "logs" / "x" / "2026-01-01.csv"
+    write_log(log, 1)
+    (tmp_path / "link").symlink_to(tmp_path / "logs")
+    (tmp_path / "logs" / "x" / "2026-01-02.csv").symlink_to(log)
+    ways = ["logs/x/2026-01-01.csv", "./logs/../logs/x/2026-01-01.csv", "link/x/*.csv", "logs/x/2026-01-02.csv"]
+    for order in (ways, ways[::-1]):
+        found = ga.fleet(order, method="identify", out="out", executor=map)
+        assert (found.logs, found.done) == (1, 1)
+        assert [r["log"] for r in found.rows()] == ["link/x/2026-01-01.csv"], "the first of its names"
+    found = ga.fleet(str(log), method="identify", out="out", executor=map)
+    assert found.there == 1 and [r["log"] for r in found.rows()] == [log.as_posix()], "the name of the last run"
+
+
+def test_a_moved_log_leaves_no_axis_behind(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    for axis in ("old", "other"):
+        write_log(tmp_path / "logs" / axis / "2026-01-01.csv", 1 if axis == "old" else 2)
+    assert identified(out="out", executor=map).done == 2
+    (tmp_path / "logs" / "old").rename(tmp_path / "logs" / "new")
+    found = identified(out="out", executor=map)
+    assert (found.logs, found.there) == (2, 2) and [r["axis"] for r in found.rows()] == ["new", "other"]
+    assert [a.axis for a in ga.trends("out").axes] == ["new", "other"]
+    found = identified(out="out", executor=map, names="(?P<axis>logs)")  # a name that is said otherwise leaves none either
+    assert {r["axis"] for r in found.rows()} == {"logs"} and not Path("out/logs/axis=new").exists()
+    (tmp_path / "logs" / "other" / "2026-01-01.csv").unlink()
+    (tmp_path / "logs" / "new" / "copy.csv").write_bytes((tmp_path / "logs" / "new" / "2026-01-01.csv").read_bytes())
+    assert len(list(identified(out="out", executor=map).rows())) == 3, "a copy is no move, and a log that is gone stays"
+
+
+def test_a_name_that_is_not_utf_8_is_a_log_like_others(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    good, bad = (os.fsdecode(b"logs/x\xff/2026-01-0%d\xe9.csv" % day) for day in (1, 2))
+    write_log(Path(good), 1)
+    Path(bad).write_text("time\n1\n")
+    found = identified(out="out", executor=map)
+    assert (found.done, found.failed) == (1, 1)
+    rows = {r["log"]: r for r in found.rows()}
+    assert {r["axis"] for r in rows.values()} == {"x\\xff"}
+    failed = rows["logs/x\\xff/2026-01-02\\xe9.csv"]
+    assert failed["status"] == "failed" and failed["error"].encode()
+    ga.trends("out", "page.html")
 
 
 def test_a_killed_run_goes_on_to_the_same_dataset(inside: Path) -> None:
@@ -259,6 +305,18 @@ def test_names_say_axis_and_time() -> None:
         ({"progress": 3}, "progress is 3"),
         ({"axis": "round"}, "round"),
         ({"drive": "none.toml"}, "no such drive file"),
+        ({"method": "diagnose", "noise": [1.0, 2.0]}, r"noise is \[1.0, 2.0\]: give its standard deviation"),
+        ({"method": "diagnose", "noise": float("inf")}, "noise is inf"),
+        ({"method": "diagnose", "pitch": "x"}, "pitch is 'x'"),
+        ({"temperature": ""}, "temperature is ''"),
+        ({"read": {"columns": {1: "time", "a": "b"}}}, "read: columns is"),
+        ({"read": {"dt": lambda: 1.0}}, "read: dt is"),
+        ({"executor": lambda work, jobs: 3}, "executor gives 3"),
+        ({"names": lambda path: {}[path]}, "names raises KeyError"),
+        ({"names": lambda path: ()}, r"names gives \(\)"),
+        ({"names": lambda path: ("x", datetime(2026, 1, 1), 3)}, "names gives"),
+        ({"names": lambda path: ("x", datetime(1, 1, 1, tzinfo=timezone(timedelta(hours=2))))}, "names gives"),
+        ({"names": lambda path: (300 * "x", datetime(2026, 1, 1))}, "too long for a folder"),
         ({"out": "run.txt"}, "this is a file"),
     ],
 )
