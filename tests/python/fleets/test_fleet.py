@@ -202,7 +202,7 @@ def test_ctrl_c_keeps_what_is_done(tmp_path: Path, monkeypatch: pytest.MonkeyPat
     interrupted(["fleet", "logs/x/*.csv", "--loop", "open", "--out", "out", "--workers", "1"], after=5.0)
     done = len(list(Path("out/results").rglob("*.json")))
     rows = list(fleet.kept_fleet("out").rows()) if done else []
-    assert len(rows) == done < 150
+    assert done - 1 <= len(rows) <= done < 150  # a result that was just written when Ctrl-C came is worked on again
 
 
 def test_the_page_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
