@@ -30,7 +30,8 @@ from rows.made.courses import DAYS, KINDS_OF_COURSE, course_of  # noqa: E402
 
 import gaident as ga  # noqa: E402
 from drive_rig import Noise, Plant, rig  # noqa: E402
-from gaident.fleets.changes import scaled, shifts_of  # noqa: E402
+from gaident.fleets.changes import Scale, shifts_of  # noqa: E402
+from gaident.policy.table import POLICY  # noqa: E402
 
 PLANT = Plant(J=3e-4, D=2e-3, kp=0.03, ki=1.9, dt=1e-3)
 COMMAND = np.repeat([60.0, -80.0, 30.0, -15.0, 45.0, -45.0], 80)
@@ -39,7 +40,7 @@ COMMAND = np.repeat([60.0, -80.0, 30.0, -15.0, 45.0, -45.0], 80)
 def followed(kind: str, seed: int) -> tuple[str, int, int, int]:
     """(kind, false alarms, days from the change to its alarm, -1 for none, days that count for false alarms)."""
     values, deviations, temperature, at = course_of(kind, seed)
-    y, s = scaled(values, deviations)
+    y, s = Scale.of(values[: POLICY.course_before])(values, deviations)
     found = [shift.found for shift in shifts_of(y, s, temperature)]
     if at < 0:
         return kind, len(found), -1, DAYS
@@ -55,7 +56,7 @@ def courses(count: int, workers: int) -> None:
             found = list(pool.map(followed, repeat(kind, count), range(count), chunksize=10))
             years = sum(days for *_, days in found) / DAYS
             delays = [d for _, _, d, _ in found]
-            changed = kind in ("step", "drift", "warm step")
+            changed = "step" in kind or kind == "drift"
             share = f"{100.0 * sum(0 <= d <= 21 for d in delays) / count:.1f} %" if changed else ""
             median = f"{np.median([d for d in delays if d >= 0]):.0f} days" if changed else ""
             print(f"{kind:12} {sum(f for _, f, _, _ in found):14} {years:11.0f} {share:>15} {median:>13}", flush=True)

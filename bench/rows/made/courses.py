@@ -6,14 +6,15 @@ import numpy as np
 from numpy.typing import NDArray
 from rows.case import Case, Result, digest
 
-from gaident.fleets.changes import levels_of, scaled, shifts_of
+from gaident.fleets.changes import Scale, levels_of, shifts_of
+from gaident.policy.table import POLICY
 
 __all__ = ["DAYS", "KINDS_OF_COURSE", "change_found", "course_of", "courses"]
 
 DAYS = 365
 IN_TIME = 21  # days
 STEP = 0.2
-KINDS_OF_COURSE = ("nothing", "step", "drift", "warm", "warm step", "outliers")
+KINDS_OF_COURSE = ("nothing", "step", "drift", "warm", "warm step", "outliers", "warm with gaps", "warm step with gaps")
 
 Vector = NDArray[np.float64]
 
@@ -38,6 +39,9 @@ def course_of(kind: str, seed: int, deviation: float = 0.02, scatter: float = 0.
     if "warm" in kind:
         temperature = 10.0 * np.sin(2.0 * np.pi * day / DAYS + rng.uniform(0.0, 6.3)) + 3.0 * rng.standard_normal(DAYS)
         y -= 0.02 * temperature
+    if temperature is not None and "gaps" in kind:  # no thermometer for 60 days, and in one log of twenty
+        gone = int(rng.integers(30, DAYS - 60))
+        temperature = np.where((rng.random(DAYS) < 0.05) | ((day >= gone) & (day < gone + 60)), np.nan, temperature)
     if kind == "outliers":
         y[rng.random(DAYS) < 0.02] += rng.choice([-1.0, 1.0])
     if "step" in kind:
@@ -53,7 +57,7 @@ def course_of(kind: str, seed: int, deviation: float = 0.02, scatter: float = 0.
 def change_found(case: Case) -> Result:
     """Right: the change within three weeks, or none where there is none; in set: with a second one that is not there."""
     values, deviations, temperature, at = course_of(case.what, case.number)
-    y, s = scaled(values, deviations)
+    y, s = Scale.of(values[: POLICY.course_before])(values, deviations)
     found = shifts_of(y, s, temperature)
     said = ", ".join(f"{f.found} ({100.0 * f.size:.0f} %)" for f in found) or "none"
     rest = digest([f"{level:.3g}" for _, _, level in levels_of(y, found)])

@@ -1,16 +1,21 @@
 """Changes in the course of a parameter, found one log after the other, with a rate of false alarms that is held.
 
-Of an axis, y_i is the logarithm of a positive parameter (else the parameter over the median of its size), s_i its deviation, T_i
-the temperature where it is logged.
+Of an axis, y_i is the logarithm of a parameter x_i whose first 20 logs (`course_before`) are positive, s_i its deviation, T_i the
+temperature where it is logged.
+Below a tenth of the median of these 20, y is the tangent of the logarithm there, which goes on where x is 0 or negative.
+Where the first 20 are not all positive, y is the parameter over the median of their sizes.
 Behind each log n, the last m logs, m = 3, 5, 8, 13, 21 and 34, are compared with those before them, b of them, 20 or more:
 
     y_i = a + c (T_i - T)  is fitted to those before, twice, the second time without what is 3.5 deviations off (`course_clip`),
     r_i = y_i - a - c (T_i - T),  v_i = s_i^2 + t^2,  t^2 what the scatter of r shows beyond the s_i,
-    z   = sum of clip(r_i/sqrt(v_i), -h, h) over the m logs / sqrt(m + u' C u),
+    z   = sum of clip(r_i/sqrt(v_i), -h, h) over the m logs / sqrt(m + u' C u + w^2 c^2 var(T)),
     h   = 3.5 where m = 3, else the larger of 3.5 and the size of the median of r_i/sqrt(v_i),
 
 so that one damaged log counts no more than the others, and logs that agree count as far as they are off.
 u is the sum of the rows (1, T_i - T) of the m logs over sqrt(v_i), C the inverse of the normal matrix of the fit.
+The line is fitted to logs with a temperature, where 20 or more have one, else c = 0; T and var(T) are of these logs.
+A log behind them without one is taken for one at T: w is the sum of 1/sqrt(v_i) over such logs, as all of them may have been as
+warm or cold.
 The scale comes from those of b logs that are kept, k the terms of the fit.
 It knows 0.7 (b - k) degrees of freedom (`course_known`), less than all, as what is left out may have been scatter: z is compared
 with the quantile of Student's distribution with so many, at `course_alarm`.
@@ -30,12 +35,15 @@ from scipy.stats import t as student
 
 from gaident.policy.table import POLICY
 
-__all__ = ["Shift", "levels_of", "scaled", "shifts_of"]
+__all__ = ["Scale", "Shift", "levels_of", "shifts_of"]
 
 Vector = NDArray[np.float64]
 
 LENGTHS = (3, 5, 8, 13, 21, 34)  # no decision: a grid of how many logs a change is behind
 MAD = 1.4826  # no decision: a formula: standard deviations in the median deviation of a normal distribution
+
+
+TANGENT = 0.1  # no decision: a formula: of the median, where the logarithm goes on straight
 
 
 @dataclass(frozen=True)
@@ -51,32 +59,61 @@ class Shift:
 
 @dataclass(frozen=True)
 class _Line:
-    """y = a + c (T - T0) of logs before, the scatter t^2 beyond their deviations, and the |z| that it needs."""
+    """y = a + c (T - middle) of logs before, the scatter t^2 beyond their deviations, and the |z| that it needs.
+
+    width: c^2 var(T), what a log without a temperature is off by.
+    """
 
     coefficients: Vector
     inverse: NDArray[np.float64]
     scatter: float
     needed: float
+    middle: float
+    width: float
+
+    def rows(self, temperatures: Vector) -> NDArray[np.float64]:
+        """(1, T - middle) of logs (m, 2), or (m, 1) without a temperature."""
+        return _rows(temperatures, self.middle)[:, : len(self.coefficients)]
 
 
-def scaled(values: Vector, deviations: Vector) -> tuple[Vector, Vector]:
-    """(y, s): relative values, whose differences are fractions of the parameter."""
-    if np.all(values > 0.0):
-        return np.log(values), deviations / values
-    size = float(np.median(np.abs(values))) or 1.0
-    return values / size, deviations / size
+def _rows(temperatures: Vector, middle: float) -> NDArray[np.float64]:
+    away = np.where(np.isfinite(temperatures), temperatures - middle, 0.0)
+    return np.column_stack([np.ones(len(away)), away])
+
+
+@dataclass(frozen=True)
+class Scale:
+    """What makes a parameter relative: of some of its values, of one sign or not, and the median of their sizes."""
+
+    logarithm: bool
+    size: float
+
+    @classmethod
+    def of(cls, values: Vector) -> Scale:
+        """Of the values that decide it (n,)."""
+        return cls(bool(np.all(values > 0.0)), float(np.median(np.abs(values))) or 1.0)
+
+    def __call__(self, values: Vector, deviations: Vector) -> tuple[Vector, Vector]:
+        """(y, s): relative values, whose differences are fractions of the parameter."""
+        x, s = values / self.size, deviations / self.size
+        if not self.logarithm:
+            return x, s
+        above = np.maximum(x, TANGENT)
+        return np.log(above) + (x - above) / TANGENT, s / above
+
+    def share(self, size: float, std: float) -> tuple[float, float]:
+        """(change over what was before, its deviation) of a difference of y."""
+        return (float(np.expm1(size)), float(np.exp(size) * std)) if self.logarithm else (size, std)
 
 
 def shifts_of(values: Vector, deviations: Vector, temperatures: Vector | None) -> list[Shift]:
-    """The changes of a course, in the order of time; values and deviations as `scaled` gives them."""
-    rows = np.ones((len(values), 1))
-    if temperatures is not None:
-        rows = np.column_stack([rows, temperatures - float(np.mean(temperatures[: POLICY.course_before]))])
+    """The changes of a course, in the order of time; values and deviations as a `Scale` gives them, nan: no temperature."""
+    heat = np.full(len(values), np.nan) if temperatures is None else temperatures
     found: list[Shift] = []
     lines: dict[int, _Line] = {}
     begin, n = 0, POLICY.course_before + POLICY.course_after - 1
     while n < len(values):
-        best = _best(values, deviations, rows, begin, n, lines)
+        best = _best(values, deviations, heat, begin, n, lines)
         if best is None:
             n += 1
             continue
@@ -87,7 +124,7 @@ def shifts_of(values: Vector, deviations: Vector, temperatures: Vector | None) -
     return found
 
 
-def _best(y: Vector, s: Vector, rows: NDArray[np.float64], begin: int, n: int, lines: dict[int, _Line]) -> Shift | None:
+def _best(y: Vector, s: Vector, heat: Vector, begin: int, n: int, lines: dict[int, _Line]) -> Shift | None:
     """The change that log n shows, if it does; lines: by the first log behind them."""
     best: Shift | None = None
     for m in LENGTHS:
@@ -95,26 +132,38 @@ def _best(y: Vector, s: Vector, rows: NDArray[np.float64], begin: int, n: int, l
         if m < POLICY.course_after or first - begin < POLICY.course_before:
             continue
         if first not in lines:
-            lines[first] = _line(y[begin:first], s[begin:first], rows[begin:first])
+            lines[first] = _line(y[begin:first], s[begin:first], heat[begin:first])
         line = lines[first]
         behind = slice(first, n + 1)
-        r = y[behind] - rows[behind] @ line.coefficients
+        rows = line.rows(heat[behind])
+        r = y[behind] - rows @ line.coefficients
         sigma = np.sqrt(s[behind] ** 2 + line.scatter)
-        u = (rows[behind] / sigma[:, None]).sum(axis=0)
+        u = (rows / sigma[:, None]).sum(axis=0)
+        unknown = ~np.isfinite(heat[behind])
+        w = float(np.sum(1.0 / sigma[unknown]))
         off = r / sigma
         bound = max(POLICY.course_clip, abs(float(np.median(off)))) if m >= POLICY.course_agree else POLICY.course_clip
-        z = float(np.clip(off, -bound, bound).sum() / np.sqrt(m + u @ line.inverse @ u))
+        z = float(np.clip(off, -bound, bound).sum() / np.sqrt(m + u @ line.inverse @ u + w**2 * line.width))
         weights = sigma**-2.0
         size = float(np.median(r))
         if abs(z) > line.needed and abs(size) > POLICY.course_material and (best is None or abs(z) > abs(best.score)):
             near = np.abs(off) < 0.5 * abs(float(np.median(off)))  # no decision: a formula: half way
             start = first + int(np.argmin(near))
-            mean = (rows[behind] * weights[:, None]).sum(axis=0) / weights.sum()
-            best = Shift(start, n, size, float(np.sqrt(1.0 / weights.sum() + mean @ line.inverse @ mean)), z)
+            mean = (rows * weights[:, None]).sum(axis=0) / weights.sum()
+            apart = (float(weights[unknown].sum()) / float(weights.sum())) ** 2 * line.width
+            best = Shift(start, n, size, float(np.sqrt(1.0 / weights.sum() + mean @ line.inverse @ mean + apart)), z)
     return best
 
 
-def _line(y: Vector, s: Vector, rows: NDArray[np.float64]) -> _Line:
+def _line(y: Vector, s: Vector, heat: Vector) -> _Line:
+    known = np.isfinite(heat)
+    middle = width = 0.0
+    if known.sum() >= POLICY.course_before:
+        y, s, heat = y[known], s[known], heat[known]
+        middle = float(np.mean(heat))
+        rows = _rows(heat, middle)
+    else:
+        rows = np.ones((len(y), 1))
     used = np.ones(len(y), dtype=bool)
     scatter = 0.0
     for last in (False, True):
@@ -132,8 +181,10 @@ def _line(y: Vector, s: Vector, rows: NDArray[np.float64]) -> _Line:
         scatter = max(spread**2 - float(np.median(s**2)), POLICY.course_scatter**2)
         if not last:
             used = away <= POLICY.course_clip * np.sqrt(s**2 + scatter)
-    known = POLICY.course_known * (len(y) - rows.shape[1])
-    return _Line(coefficients, inverse, scatter, float(student.isf(0.5 * POLICY.course_alarm, known)))
+    if rows.shape[1] > 1:
+        width = float(coefficients[1] ** 2 * np.var(heat))
+    freedom = POLICY.course_known * (len(y) - rows.shape[1])
+    return _Line(coefficients, inverse, scatter, float(student.isf(0.5 * POLICY.course_alarm, freedom)), middle, width)
 
 
 def levels_of(values: Vector, shifts: list[Shift]) -> list[tuple[int, int, float]]:

@@ -48,7 +48,7 @@ class Quantity(NamedTuple):
 
 @dataclass(frozen=True)
 class RawCourse:
-    """The values of a quantity with their deviations, times, temperatures where all logs have one, and logs."""
+    """The values of a quantity with their deviations, times, temperatures (nan: not logged) where a log has one, and logs."""
 
     unit: str
     times: tuple[str, ...]
@@ -103,14 +103,13 @@ def _is_level(row: Mapping[str, Any]) -> bool:
 
 def _course(rows: list[Mapping[str, Any]]) -> RawCourse:
     usable = [r for r in rows if _usable(r)]
-    heat = [r["temperature"] for r in usable]
-    known = bool(heat) and all(t is not None and math.isfinite(t) for t in heat)
+    heat = np.array([math.nan if r["temperature"] is None else r["temperature"] for r in usable], dtype=np.float64)
     return RawCourse(
         rows[0]["unit"],
         tuple(r["time"] for r in usable),
         np.array([r["value"] for r in usable], dtype=np.float64),
         np.array([r["std"] for r in usable], dtype=np.float64),
-        np.array(heat, dtype=np.float64) if known else None,
+        heat if np.any(np.isfinite(heat)) else None,
         tuple(r["log"] for r in usable),
         len(rows) - len(usable),
     )

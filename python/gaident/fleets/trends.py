@@ -11,7 +11,7 @@ from scipy.stats import norm
 
 from gaident.checks import checked_path, yes_or_no
 from gaident.errors import SettingsError
-from gaident.fleets.changes import MAD, levels_of, scaled, shifts_of
+from gaident.fleets.changes import MAD, Scale, levels_of, shifts_of
 from gaident.fleets.courses import AxisTables, Quantity, RawCourse, axes_of, courses_of
 from gaident.fleets.found import AxisState, Change, Course, Sibling, Trends
 from gaident.fleets.page import write_page
@@ -30,7 +30,7 @@ def trends(
     """Show what changed on which axis of a fleet, and which axis differs from the others.
 
     The course of each parameter of each axis is followed log by log; a change is one beyond the scatter of the logs before it.
-    Where all logs of a course have a temperature, its line through the logarithm of the parameter is taken out.
+    Where logs of a course have a temperature, its line through the logarithm of the parameter is taken out.
     See docs/how-to/fleets.md for the rule and its rates.
 
     Parameters
@@ -108,17 +108,18 @@ def _followed(axis: str, quantity: Quantity, raw: RawCourse) -> tuple[Course, fl
     changes: tuple[Change, ...] = ()
     level = None
     if count:
-        y, s = scaled(raw.values, raw.deviations)
+        scale = Scale.of(raw.values[: POLICY.course_before])
+        y, s = scale(raw.values, raw.deviations)
         shifts = shifts_of(y, s, raw.temperatures) if not poor else []
-        stretches = levels_of(raw.values, shifts)
-        level = stretches[-1][2]
+        level = levels_of(raw.values, shifts)[-1][2]
+        # What is said of a change rests on the logs up to that which showed it, and stays.
         changes = tuple(
             Change(
                 *(axis, str(quantity), raw.times[shift.first], raw.times[shift.found], raw.logs[shift.first]),
-                *(stretches[k][2], stretches[k + 1][2], raw.unit),
-                *_as_share(shift.size, shift.std, bool(np.all(raw.values > 0.0))),
+                *(_median(raw.values[begin : shift.first]), _median(raw.values[shift.first : shift.found + 1]), raw.unit),
+                *scale.share(shift.size, shift.std),
             )
-            for k, shift in enumerate(shifts)
+            for begin, shift in zip((0, *(s.first for s in shifts)), shifts, strict=False)
         )
     return Course(
         *(axis, str(quantity), raw.unit, raw.times, raw.values, raw.deviations, raw.logs),
@@ -126,8 +127,8 @@ def _followed(axis: str, quantity: Quantity, raw: RawCourse) -> tuple[Course, fl
     ), level
 
 
-def _as_share(size: float, std: float, logarithm: bool) -> tuple[float, float]:
-    return (float(np.expm1(size)), float(np.exp(size) * std)) if logarithm else (size, std)
+def _median(values: Vector) -> float:
+    return float(np.median(values))
 
 
 def _siblings(levels: Mapping[Quantity, list[tuple[str, float, str]]]) -> tuple[Sibling, ...]:
@@ -140,7 +141,7 @@ def _siblings(levels: Mapping[Quantity, list[tuple[str, float, str]]]) -> tuple[
         if len(listed) < POLICY.siblings:
             continue
         values = np.array([value for _, value, _ in listed])
-        y, _ = scaled(values, np.zeros(len(values)))
+        y, _ = Scale.of(values)(values, np.zeros(len(values)))
         middle = float(np.median(y))
         spread = max(MAD * float(np.median(np.abs(y - middle))), POLICY.course_scatter)
         bound = float(norm.isf(0.5 * POLICY.sibling_level / len(listed)))

@@ -12,7 +12,7 @@ import pytest
 
 import gaident as ga
 from gaident.cli import main
-from gaident.fleets.changes import scaled, shifts_of
+from gaident.fleets.changes import Scale, shifts_of
 from gaident.fleets.dataset import best_format, write_part
 
 DAYS = 90
@@ -66,18 +66,45 @@ def test_an_axis_that_differs_and_one_that_is_too_poor(fleet_of_seven: Path) -> 
 
 def test_later_logs_change_no_alarm() -> None:
     values = noisy(1.0, 1, 150) * np.where(np.arange(150) >= 80, 1.15, 1.0)
-    y, s = scaled(values, 0.01 * values)
+    y, s = Scale.of(values[:20])(values, 0.01 * values)
     whole = shifts_of(y, s, None)
     assert whole
     for n in (whole[0].found, whole[0].found + 1, 120):
         assert shifts_of(y[:n], s[:n], None) == [shift for shift in whole if shift.found < n]
 
 
+@pytest.mark.parametrize("low", [1.0, -0.5], ids=["positive first", "negative first"])
+def test_no_later_log_changes_what_an_alarm_says(tmp_path: Path, low: float) -> None:
+    """Neither a value below 0, nor another level, nor logs at the end."""
+    rng = np.random.default_rng(8)
+    values = np.concatenate([np.full(40, low), np.full(20, 1.5 * low), np.full(20, 4.0), np.full(10, -3.0)])
+    values = values + 0.02 * rng.standard_normal(len(values))
+    said = []
+    for n in (55, 70, 90):
+        write_course(tmp_path / str(n), "x", values[:n])
+        said.append(ga.trends(tmp_path / str(n)).changes)
+    assert said[0] and said[1][: len(said[0])] == said[0] and said[2][: len(said[1])] == said[1]
+    assert said[0][0].share == pytest.approx(0.5 if low > 0.0 else -0.5, abs=0.1)
+
+
+def test_a_log_without_a_temperature_is_one_of_any_temperature() -> None:
+    """Friction falls by 2 % a degree: 50 days without a thermometer are no change, a step of twice in them is."""
+    rng = np.random.default_rng(3)
+    heat = 20.0 + 10.0 * np.sin(2.0 * np.pi * np.arange(200) / 200) + 2.0 * rng.standard_normal(200)
+    s = np.full(200, 0.01)
+    y = -0.02 * heat + 0.02 * rng.standard_normal(200)
+    assert shifts_of(y, s, np.where(np.arange(200) == 77, np.nan, heat)) == []
+    gone = np.where(np.arange(200) >= 150, np.nan, heat)
+    assert shifts_of(y, s, gone) == [] and shifts_of(y, s, None)
+    (shift,) = shifts_of(y + np.where(np.arange(200) >= 160, 0.7, 0.0), s, gone)
+    assert abs(shift.first - 160) <= 1
+
+
 def test_temperature_is_no_change_and_hides_none() -> None:
     rng = np.random.default_rng(3)
     heat = 20.0 + 10.0 * np.sin(2.0 * np.pi * np.arange(200) / 200) + 2.0 * rng.standard_normal(200)
     values = np.exp(-0.02 * heat + 0.02 * rng.standard_normal(200))
-    y, s = scaled(values, 0.01 * values)
+    y, s = Scale.of(values[:20])(values, 0.01 * values)
     assert shifts_of(y, s, None)
     assert not shifts_of(y, s, heat)
     y[120:] += 0.2
@@ -100,7 +127,7 @@ def test_logs_that_agree_are_told_soon_and_damaged_ones_are_not() -> None:
 def test_outliers_are_no_change() -> None:
     values = noisy(1.0, 5, 120)
     values[[25, 40, 41, 90]] *= 3.0
-    y, s = scaled(values, 0.01 * values)
+    y, s = Scale.of(values[:20])(values, 0.01 * values)
     assert not shifts_of(y, s, None)
     assert not shifts_of(np.zeros(60), np.zeros(60), None)  # no scatter at all
 
