@@ -31,7 +31,6 @@ from rows.made.courses import DAYS, KINDS_OF_COURSE, course_of  # noqa: E402
 import gaident as ga  # noqa: E402
 from drive_rig import Noise, Plant, rig  # noqa: E402
 from gaident.fleets.changes import Scale, shifts_of  # noqa: E402
-from gaident.policy.table import POLICY  # noqa: E402
 
 PLANT = Plant(J=3e-4, D=2e-3, kp=0.03, ki=1.9, dt=1e-3)
 COMMAND = np.repeat([60.0, -80.0, 30.0, -15.0, 45.0, -45.0], 80)
@@ -40,7 +39,7 @@ COMMAND = np.repeat([60.0, -80.0, 30.0, -15.0, 45.0, -45.0], 80)
 def followed(kind: str, seed: int) -> tuple[str, int, int, int]:
     """(kind, false alarms, days from the change to its alarm, -1 for none, days that count for false alarms)."""
     values, deviations, temperature, at = course_of(kind, seed)
-    y, s = Scale.of(values[: POLICY.course_before])(values, deviations)
+    y, s = Scale.of_course(values)(values, deviations)
     found = [shift.found for shift in shifts_of(y, s, temperature)]
     if at < 0:
         return kind, len(found), -1, DAYS

@@ -7,7 +7,6 @@ from numpy.typing import NDArray
 from rows.case import Case, Result, digest
 
 from gaident.fleets.changes import Scale, levels_of, shifts_of
-from gaident.policy.table import POLICY
 
 __all__ = ["DAYS", "KINDS_OF_COURSE", "change_found", "course_of", "courses"]
 
@@ -57,7 +56,7 @@ def course_of(kind: str, seed: int, deviation: float = 0.02, scatter: float = 0.
 def change_found(case: Case) -> Result:
     """Right: the change within three weeks, or none where there is none; in set: with a second one that is not there."""
     values, deviations, temperature, at = course_of(case.what, case.number)
-    y, s = Scale.of(values[: POLICY.course_before])(values, deviations)
+    y, s = Scale.of_course(values)(values, deviations)
     found = shifts_of(y, s, temperature)
     said = ", ".join(f"{f.found} ({100.0 * f.size:.0f} %)" for f in found) or "none"
     rest = digest([f"{level:.3g}" for _, _, level in levels_of(y, found)])

@@ -69,10 +69,11 @@ def assemble(table: LogTable, wanted: Wanted, stem: str) -> Record:
             if wanted.velocity_cutoff_hz is not None:  # all channels alike: filtered alone, a velocity is that of another plant
                 values = {channel: low_pass(x, dt, wanted.velocity_cutoff_hz) for channel, x in values.items()}
                 said.append(f"All channels went through the same zero-phase low-pass of {wanted.velocity_cutoff_hz:g} Hz.")
-                values["velocity"] = differentiate(values["position"], dt)
-            else:
-                said += [AS_THE_DRIVE] * _placed_alone(values)
+            if _placed_alone(values) and wanted.velocity_cutoff_hz is None:
                 values["velocity"] = backward_difference(values["position"], dt)
+                said.append(AS_THE_DRIVE)
+            else:
+                values["velocity"] = differentiate(values["position"], dt)
         if not ELECTRICAL.isdisjoint(named):
             values["torque"], kind, note = torque_of_winding(table, wanted, values, dt)
             said += [note] if note else []

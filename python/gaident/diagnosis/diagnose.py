@@ -32,7 +32,7 @@ from gaident.errors import SettingsError
 from gaident.identification.identify import identify
 from gaident.identification.replay.command_timing import timed
 from gaident.identification.replay.driven_records import torque_driven
-from gaident.models.drive_torque import as_differenced, on_lines
+from gaident.models.drive_torque import on_lines
 from gaident.policy.table import POLICY
 from gaident.results.diagnosis import Diagnosis
 from gaident.results.finding import Finding
@@ -134,14 +134,11 @@ def diagnose(
     recorded = records_of(rec, "rec")
     apart = () if validation is None else records_of(validation, "validation")
     with one_thread(), np.errstate(over="ignore", invalid="ignore"):
-        named = checked_controller(controller)
-        given, lines = outliers_of_the_log([as_differenced(r, named) for r in recorded], named)
-        asked = loop_of(given, named)
+        given, lines = outliers_of_the_log(recorded, checked_controller(controller))
+        asked = loop_of(given, checked_controller(controller))
         given = timed(given, asked.controller)
         driven = torque_driven(given, asked.controller)
-        kept = timed(
-            outliers_of_the_log([as_differenced(r, asked.controller) for r in apart], asked.controller)[0], asked.controller
-        )
+        kept = timed(outliers_of_the_log(apart, asked.controller)[0], asked.controller)
     records = tuple(on_lines(r, driven.controller) for r in driven.records)
     validating = tuple(on_lines(r, asked.controller) for r in torque_driven(kept, asked.controller).records) if kept else ()
     checked(records, validating, driven.loop, identification, bootstrap, seed, progress, axis, pitch)

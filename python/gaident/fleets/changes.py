@@ -41,8 +41,6 @@ Vector = NDArray[np.float64]
 
 LENGTHS = (3, 5, 8, 13, 21, 34)  # no decision: a grid of how many logs a change is behind
 MAD = 1.4826  # no decision: a formula: standard deviations in the median deviation of a normal distribution
-
-
 TANGENT = 0.1  # no decision: a formula: of the median, where the logarithm goes on straight
 
 
@@ -92,6 +90,11 @@ class Scale:
     def of(cls, values: Vector) -> Scale:
         """Of the values that decide it (n,)."""
         return cls(bool(np.all(values > 0.0)), float(np.median(np.abs(values))) or 1.0)
+
+    @classmethod
+    def of_course(cls, values: Vector) -> Scale:
+        """Of a course (n,): its first logs decide, so that no later one changes it."""
+        return cls.of(values[: POLICY.course_before])
 
     def __call__(self, values: Vector, deviations: Vector) -> tuple[Vector, Vector]:
         """(y, s): relative values, whose differences are fractions of the parameter."""

@@ -108,7 +108,7 @@ def _followed(axis: str, quantity: Quantity, raw: RawCourse) -> tuple[Course, fl
     changes: tuple[Change, ...] = ()
     level = None
     if count:
-        scale = Scale.of(raw.values[: POLICY.course_before])
+        scale = Scale.of_course(raw.values)
         y, s = scale(raw.values, raw.deviations)
         shifts = shifts_of(y, s, raw.temperatures) if not poor else []
         level = levels_of(raw.values, shifts)[-1][2]

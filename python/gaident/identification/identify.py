@@ -29,7 +29,7 @@ from gaident.identification.replay.notes import replay_notes
 from gaident.identification.replay.timed_record import plain_of
 from gaident.identification.selection import Candidate
 from gaident.messages import Message
-from gaident.models.drive_torque import as_differenced
+from gaident.models.drive_torque import as_differenced, without_age
 from gaident.models.mechanics import mechanics_from_model
 from gaident.models.model import Model
 from gaident.models.search_space import SearchSpace
@@ -122,7 +122,8 @@ def identify(
     """
     began = time.perf_counter()
     recorded = checked_records(rec, controller)
-    checked = [as_differenced(r, controller, looped=bare_pi(controller) is not None) for r in recorded]
+    # A simulated loop knows no age of a velocity.
+    checked = [as_differenced(r, controller) if bare_pi(controller) is None else without_age(r) for r in recorded]
     numbers = with_estimates(checked, controller).trusted()
     settings = Settings() if settings is None else settings
     if not isinstance(settings, Settings):

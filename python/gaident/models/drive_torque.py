@@ -123,17 +123,22 @@ def _at_its_clock(rec: Record, torque: Vector, controller: Controller, stored: f
     return _straight(rec, torque, every)
 
 
-def as_differenced(rec: Record, controller: Controller | None, looped: bool = False) -> Record:
+def as_differenced(rec: Record, controller: Controller | None) -> Record:
     """The record with the velocity that its controller forms of its position, where the log's is a difference of its lines.
 
     That one is another velocity: the mean over the line before it, of several samples of the controller, or over two lines.
-    looped: for a simulated loop that knows no age of a velocity: the difference over two lines, which has none.
     """
     if rec.position is None or not is_difference_of_lines(rec.velocity, rec.position, rec.dt):
         return rec
     every = 1 if controller is None else controller.log_every(rec.dt)
-    velocity = np.gradient(rec.position, rec.dt) if looped else difference_at_clock(rec.position, rec.dt, every)
-    return rec.with_channels(velocity=velocity)
+    return rec.with_channels(velocity=difference_at_clock(rec.position, rec.dt, every))
+
+
+def without_age(rec: Record) -> Record:
+    """The record with the difference over two lines, which has no age, where its velocity is a difference of lines."""
+    if rec.position is None or not is_difference_of_lines(rec.velocity, rec.position, rec.dt):
+        return rec
+    return rec.with_channels(velocity=np.gradient(rec.position, rec.dt))
 
 
 def as_old_as_its_velocity(rec: Record, every: int) -> Record:

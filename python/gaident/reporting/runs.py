@@ -59,6 +59,7 @@ def run_of(result: Diagnosis | Identification, rec: Record) -> RecordView:
             extended = free_run(result.model, "extended")
     else:
         before = _finite(result.simulate(rec), rec, "linear", notes)
+        rec = result.as_used(rec)
     rec = on_lines(rec, result.controller)
     simulated = rec.torque is None and result.controller is not None and loop is None
     torque = run(linear, rec, result.controller).torque if simulated else torque_of(rec, loop)

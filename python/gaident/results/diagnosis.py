@@ -201,7 +201,7 @@ class Diagnosis(WhatIf):
         Returns
         -------
         Record
-            The same, or one with its channels moved and its torque changed.
+            The same, or one with its channels moved and its torque and velocity changed.
 
         Raises
         ------

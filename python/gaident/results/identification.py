@@ -12,8 +12,10 @@ from numpy.typing import NDArray
 from gaident.axis import linear_sentences, restored
 from gaident.control.cascade import controller_of
 from gaident.control.controller import Controller
+from gaident.control.pi import bare_pi
 from gaident.data.record import Record
 from gaident.errors import GaidentError, check_schema
+from gaident.models.drive_torque import as_differenced, as_old_as_its_velocity, without_age
 from gaident.models.mechanics import Mechanics, mechanics_from_dict
 from gaident.models.model import Model
 from gaident.models.search_space import SearchSpace
@@ -144,8 +146,29 @@ class Identification(SavedResult):
         """Whether the data contradict the linear model; its mechanics are then not to be trusted."""
         return self.adequacy.falsified
 
+    def as_used(self, rec: Record) -> Record:
+        """Return a record as an identification under this controller takes it.
+
+        It is another one where the velocity is a plain difference of the logged positions: in a simulated loop the velocity is
+        then the difference over two lines; else it is that of the last two, and the torque is as late.
+
+        Parameters
+        ----------
+        rec : Record
+            Any record as it was logged.
+
+        Returns
+        -------
+        Record
+            The same, or one with another velocity and torque.
+        """
+        if bare_pi(self.controller) is not None:
+            return without_age(rec)
+        every = 1 if self.controller is None else self.controller.log_every(rec.dt)
+        return as_old_as_its_velocity(as_differenced(rec, self.controller), every)
+
     def simulate(self, rec: Record) -> NDArray[np.float64]:
-        """Return the free-run velocity of the model on a record [rad/s], shape (n,).
+        """Return the free-run velocity of the model on a record [rad/s], shape (n,), beside that of `as_used`.
 
         A record that was used in the identification starts from the state found there.
         Another one that does not start at rest gets its initial state estimated.
@@ -155,6 +178,7 @@ class Identification(SavedResult):
             raise GaidentError(f"rec is {type(rec).__name__}: give a gaident.Record")
         state: Sequence[float] | NDArray[np.float64] | None = self.initial_states.get(rec.digest)
         unseen = rec.digest not in self.digests and self.settings.initial_state != "rest"
+        rec = self.as_used(rec)
         if state is None and unseen and starts_moving(rec, self.controller):
             if self.controller is not None and not self.controller.one_equation:
                 raise GaidentError(
@@ -171,7 +195,7 @@ class Identification(SavedResult):
     def residual(self, rec: Record) -> NDArray[np.float64]:
         """Return measured minus simulated velocity [rad/s], shape (n,)."""
         simulated = self.simulate(rec)  # which looks at `rec`
-        return rec.velocity - simulated
+        return self.as_used(rec).velocity - simulated
 
     def summary(self, axis: str = "rotary", units: Mapping[str, str | float] | None = None) -> str:
         """Return the result as text.

@@ -71,7 +71,7 @@ def plot_identification(idn: Identification, records: Sequence[Record], axis: st
     grid = fig.subplots(len(heights), len(shown), sharex="col", squeeze=False, height_ratios=heights)
     for column, rec in enumerate(shown):
         top, low = grid[0, column], grid[1, column]
-        simulated = idn.simulate(rec)
+        simulated, rec = idn.simulate(rec), idn.as_used(rec)
         if rec.command is not None and not open_loop:
             line(top, rec.time, rec.command, color=GREY, linewidth=1.2, linestyle="--", label="command")
         # Wide below, thin above: both are seen where they agree to the width of a line.

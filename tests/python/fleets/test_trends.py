@@ -66,7 +66,7 @@ def test_an_axis_that_differs_and_one_that_is_too_poor(fleet_of_seven: Path) -> 
 
 def test_later_logs_change_no_alarm() -> None:
     values = noisy(1.0, 1, 150) * np.where(np.arange(150) >= 80, 1.15, 1.0)
-    y, s = Scale.of(values[:20])(values, 0.01 * values)
+    y, s = Scale.of_course(values)(values, 0.01 * values)
     whole = shifts_of(y, s, None)
     assert whole
     for n in (whole[0].found, whole[0].found + 1, 120):
@@ -104,7 +104,7 @@ def test_temperature_is_no_change_and_hides_none() -> None:
     rng = np.random.default_rng(3)
     heat = 20.0 + 10.0 * np.sin(2.0 * np.pi * np.arange(200) / 200) + 2.0 * rng.standard_normal(200)
     values = np.exp(-0.02 * heat + 0.02 * rng.standard_normal(200))
-    y, s = Scale.of(values[:20])(values, 0.01 * values)
+    y, s = Scale.of_course(values)(values, 0.01 * values)
     assert shifts_of(y, s, None)
     assert not shifts_of(y, s, heat)
     y[120:] += 0.2
@@ -127,7 +127,7 @@ def test_logs_that_agree_are_told_soon_and_damaged_ones_are_not() -> None:
 def test_outliers_are_no_change() -> None:
     values = noisy(1.0, 5, 120)
     values[[25, 40, 41, 90]] *= 3.0
-    y, s = Scale.of(values[:20])(values, 0.01 * values)
+    y, s = Scale.of_course(values)(values, 0.01 * values)
     assert not shifts_of(y, s, None)
     assert not shifts_of(np.zeros(60), np.zeros(60), None)  # no scatter at all
 

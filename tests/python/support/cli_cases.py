@@ -6,6 +6,7 @@ import signal
 import subprocess
 import sys
 import time
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -46,14 +47,21 @@ def write_step(path: str) -> None:
     np.savetxt(path, columns, delimiter=",", header="t,w_ref,w,u", comments="")
 
 
-def interrupted(args: list[str], after: float) -> float:
-    """Sends Ctrl-C to a call `after` so many seconds and asserts that it ends with one line; the seconds it took to."""
+def interrupted(args: list[str], after: float = 0.0, until: Callable[[], bool] = lambda: True) -> float:
+    """Sends Ctrl-C to a call `after` so many seconds, and not before `until`; asserts that it ends with one line.
+
+    Returns the seconds that it took to.
+    """
     with subprocess.Popen(
         [sys.executable, "-c", LONG, *args], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
     ) as process:
         assert process.stdout is not None and process.stderr is not None
         assert process.stdout.readline() == "ready\n"
         time.sleep(after)
+        given_up = time.monotonic() + 60.0
+        while not until():
+            assert time.monotonic() < given_up and process.poll() is None
+            time.sleep(0.05)
         assert process.poll() is None
         began = time.perf_counter()
         process.send_signal(signal.SIGINT)

@@ -1,5 +1,7 @@
 """The records as their controller read them: an outlier of the log alone is no part of what the controller answers.
 
+A velocity that is a difference of the log's positions is the one that the controller formed of them, see `as_differenced`.
+
 Where a torque is logged it tells which: an outlier that the controller read is answered by its torque.
 """
 
@@ -19,6 +21,7 @@ from gaident.diagnosis.controller.slow_forms import run_error
 from gaident.diagnosis.records.hygiene import cleaned, outliers
 from gaident.identification.logged_stretches import log_of
 from gaident.identification.logged_torque import tells_of_controller
+from gaident.models.drive_torque import as_differenced
 from gaident.models.starts import noise_std
 from gaident.policy.table import POLICY
 from gaident.results.diagnosis import Diagnosis
@@ -49,14 +52,14 @@ def _replay_error(rec: Record, controller: Controller) -> float:
 
 
 def outliers_of_the_log(records: Sequence[Record], controller: Controller | None) -> tuple[tuple[Record, ...], tuple[Lines, ...]]:
-    """(the records with what their controller read in the place of outliers, the lines of these).
+    """(the records with what their controller read, also in the place of outliers, the lines of these).
 
     An outlier stands in the log alone where the velocity that the torque answers is nearer to its neighbours than to the outlier.
     With it the logged torque does not follow from the controller, and a form of controller would be looked for in vain.
     Where a log is slower than its controller, a velocity that is smooth between the lines spreads it over its neighbours, in the
     torque that drives a model, too.
     """
-    found = [_of_the_log(r, controller) for r in records]
+    found = [_of_the_log(as_differenced(r, controller), controller) for r in records]
     return tuple(r for r, _ in found), tuple(lines for _, lines in found)
 
 

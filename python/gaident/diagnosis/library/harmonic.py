@@ -70,7 +70,7 @@ CAUSES: tuple[Cause, ...] = (
         least=POLICY.inertia_share,
         orders=(1, HIGHEST_LOBE),
         needs=(t.periodic, t.moves, t.period_of_a_lobe),
-        unseen=t.orders_beyond,
+        unseen=t.lobes_beyond,
         excited_by=("random signal at speed", "speeds mixed in time"),
     ),
     tone(

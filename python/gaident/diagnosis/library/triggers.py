@@ -203,8 +203,8 @@ def period_of_a_lobe(s: Motions) -> Text | None:
     return _period_of(HIGHEST_LOBE, s)
 
 
-def _period_of(order_: int, s: Motions) -> Text | None:
-    highest = order_ * _per_turn(s)
+def _period_of(last: int, s: Motions) -> Text | None:
+    highest = last * _per_turn(s)
     if s.travel < TURN / highest:
         return say("{} contain no period of order {} or less", _reach(s), order(highest))
     return None
@@ -354,9 +354,18 @@ def frequencies_beyond(s: Motions) -> Text:
 
 def orders_beyond(s: Motions) -> Text | None:
     """Orders of the angle too low for the travel, or too high for the sampling."""
+    return _beyond(HIGHEST_ORDER, s)
+
+
+def lobes_beyond(s: Motions) -> Text | None:
+    """Such orders of an inertia."""
+    return _beyond(HIGHEST_LOBE, s)
+
+
+def _beyond(last: int, s: Motions) -> Text | None:
     one = _per_turn(s)
     reached = s.travel * one / TURN  # periods of the first order
-    least = math.ceil(POLICY.seen_periods / reached) if reached > 0.0 else HIGHEST_ORDER
+    least = math.ceil(POLICY.seen_periods / reached) if reached > 0.0 else last
     if least == 2 and reached > POLICY.seen_turn:  # no decision: a formula: the second order, below which the first one shows
         least = 1
     per_sample = max(_slowest_held(m) * m.dt for m in s.records)
@@ -364,9 +373,9 @@ def orders_beyond(s: Motions) -> Text | None:
     text = "orders below {} need more than the {} between the lowest and the highest {angle} of a record"
     below = say(text, order(least * one), turns(s.travel))
     parts = [below] if least > (1 if s.period else 2) else []  # of a turn, order 1 is an unbalance
-    if fastest is not None and fastest < HIGHEST_ORDER:
+    if fastest is not None and fastest < last:
         parts.append(say("orders above {} are faster than the sampling even at the slowest speed held", order(fastest * one)))
-    return joined("; ", parts) if parts and least <= HIGHEST_ORDER else None
+    return joined("; ", parts) if parts and least <= last else None
 
 
 def _slowest_held(m: SeenMotion) -> float:
