@@ -248,3 +248,24 @@ def test_an_identification_keeps_the_digest_of_a_log_whose_velocity_it_made_anew
     idn = ga.identify(rec.with_channels(command=None, position_command=None), settings=ga.Settings(generations=3, population=20))
     assert idn.digests == (rec.with_channels(command=None, position_command=None).digest,)
     assert pytest.approx(1.5e-3, rel=1e-3) == idn.mechanics.J
+
+
+@pytest.mark.parametrize("controller", [None, ga.PI(0.3, 15.0)], ids=["open", "loop"])
+def test_the_residual_is_that_of_the_fit_whichever_difference_was_given(controller: ga.PI | None) -> None:
+    skip_without_library()
+    axis = Plant(J=1.5e-3, D=2e-3, kp=0.3, ki=15.0, dt=T, cascade=ga.Cascade(ga.PI(0.3, 15.0), T))
+    command = np.repeat([20.0, -15.0, 25.0, -10.0, 18.0], 400)
+    log = run_drive(axis, command, {}, encoder=LSB)
+    position = LSB * np.floor(np.asarray(log.position) / LSB)
+    found = []
+    for velocity in (backward_difference(position, T), ga.differentiate(position, T)):
+        rec = ga.Record(T, command=command, velocity=velocity, position=position, torque=log.torque)
+        space = ga.SearchSpace(gain=(100.0, 5e3), real=(0.1, 100.0), imaginary=(0.0, 300.0), p=(1, 1), q=(0, 0))
+        idn = ga.identify(rec, controller=controller, space=space)
+        used = idn.as_used(rec)
+        spread = float(np.sqrt(np.mean((used.velocity - used.velocity.mean()) ** 2)))
+        left = float(np.sqrt(np.mean(idn.residual(rec) ** 2)))
+        assert 100.0 * (1.0 - left / spread) == pytest.approx(idn.fit_percent, abs=0.01)
+        assert isinstance(idn.mechanics, ga.OneMass)
+        found.append(idn.mechanics.J)
+    assert found[0] == pytest.approx(found[1], rel=1e-6) and found[0] == pytest.approx(1.5e-3, rel=2e-3)
