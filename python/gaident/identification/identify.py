@@ -133,7 +133,7 @@ def identify(
     check_numbers(trials, seed, workers, progress)
     check_arithmetic(settings, loop)
     threads = processors() if workers is None else int(workers)
-    digests = distinct(recorded)
+    digests = distinct(given)
     # Sums must not depend on the order given.
     order = sorted(range(len(given)), key=lambda i: (digests[i], given[i].name))
     records, digests = [given[i] for i in order], [digests[i] for i in order]

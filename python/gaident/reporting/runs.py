@@ -36,6 +36,7 @@ def run_of(result: Diagnosis | Identification, rec: Record) -> RecordView:
     """One record and what the models make of it."""
     loop = bare_pi(result.controller)
     linear: Model = result.model.mechanism if isinstance(result, Diagnosis) else result.model
+    rec = rec if isinstance(result, Diagnosis) else result.as_used(rec)
     digest = rec.digest
     used = "fitted" if digest in result.digests else "new"
     notes: list[str] = []
@@ -59,7 +60,6 @@ def run_of(result: Diagnosis | Identification, rec: Record) -> RecordView:
             extended = free_run(result.model, "extended")
     else:
         before = _finite(result.simulate(rec), rec, "linear", notes)
-        rec = result.as_used(rec)
     rec = on_lines(rec, result.controller)
     simulated = rec.torque is None and result.controller is not None and loop is None
     torque = run(linear, rec, result.controller).torque if simulated else torque_of(rec, loop)

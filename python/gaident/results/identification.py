@@ -151,17 +151,20 @@ class Identification(SavedResult):
 
         It is another one where the velocity is a plain difference of the logged positions: in a simulated loop the velocity is
         then the difference over two lines; else it is that of the last two, and the torque is as late.
+        `records` and `digests` are of the records as they were used.
 
         Parameters
         ----------
         rec : Record
-            Any record as it was logged.
+            Any record as it was logged, or one of `records`.
 
         Returns
         -------
         Record
             The same, or one with another velocity and torque.
         """
+        if rec.digest in self.digests:
+            return rec
         if bare_pi(self.controller) is not None:
             return without_age(rec)
         every = 1 if self.controller is None else self.controller.log_every(rec.dt)
@@ -176,9 +179,9 @@ class Identification(SavedResult):
         """
         if not isinstance(rec, Record):
             raise GaidentError(f"rec is {type(rec).__name__}: give a gaident.Record")
+        rec = self.as_used(rec)
         state: Sequence[float] | NDArray[np.float64] | None = self.initial_states.get(rec.digest)
         unseen = rec.digest not in self.digests and self.settings.initial_state != "rest"
-        rec = self.as_used(rec)
         if state is None and unseen and starts_moving(rec, self.controller):
             if self.controller is not None and not self.controller.one_equation:
                 raise GaidentError(

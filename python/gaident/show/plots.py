@@ -69,9 +69,9 @@ def plot_identification(idn: Identification, records: Sequence[Record], axis: st
     heights = (3.0, 1.4, 1.0) if open_loop else (3.0, 1.4)
     fig = new_figure(max(7.0, 4.6 * len(shown)), 1.25 * sum(heights))
     grid = fig.subplots(len(heights), len(shown), sharex="col", squeeze=False, height_ratios=heights)
-    for column, rec in enumerate(shown):
+    for column, rec in enumerate(map(idn.as_used, shown)):
         top, low = grid[0, column], grid[1, column]
-        simulated, rec = idn.simulate(rec), idn.as_used(rec)
+        simulated = idn.simulate(rec)
         if rec.command is not None and not open_loop:
             line(top, rec.time, rec.command, color=GREY, linewidth=1.2, linestyle="--", label="command")
         # Wide below, thin above: both are seen where they agree to the width of a line.

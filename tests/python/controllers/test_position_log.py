@@ -243,10 +243,11 @@ def test_two_masses_of_such_a_log_are_no_finding() -> None:
         assert dia.mechanics[name].value == pytest.approx(value, rel=2e-3)
 
 
-def test_an_identification_keeps_the_digest_of_a_log_whose_velocity_it_made_anew() -> None:
-    rec = servo_log(1, {})
-    idn = ga.identify(rec.with_channels(command=None, position_command=None), settings=ga.Settings(generations=3, population=20))
-    assert idn.digests == (rec.with_channels(command=None, position_command=None).digest,)
+def test_an_identification_knows_a_log_again_whose_velocity_it_made_anew() -> None:
+    rec = servo_log(1, {}).with_channels(position_command=None)
+    idn = ga.identify(rec, settings=ga.Settings(generations=3, population=20))
+    used = idn.as_used(rec)
+    assert used != rec and idn.digests == (used.digest,) and idn.records == (used,) and idn.as_used(used) is used
     assert pytest.approx(1.5e-3, rel=1e-3) == idn.mechanics.J
 
 
@@ -265,6 +266,7 @@ def test_the_residual_is_that_of_the_fit_whichever_difference_was_given(controll
         used = idn.as_used(rec)
         spread = float(np.sqrt(np.mean((used.velocity - used.velocity.mean()) ** 2)))
         left = float(np.sqrt(np.mean(idn.residual(rec) ** 2)))
+        assert np.array_equal(idn.residual(idn.records[0]), idn.residual(rec))
         assert 100.0 * (1.0 - left / spread) == pytest.approx(idn.fit_percent, abs=0.01)
         assert isinstance(idn.mechanics, ga.OneMass)
         found.append(idn.mechanics.J)
