@@ -174,15 +174,35 @@ MOST_STATES: int  # of plant and controller in one difference equation
 def servo_order(*, loop: Loop, clock: Clock) -> int:
     """States that a servo adds to those of the plant; ValueError where plant and servo make no linear equation."""
 
+class Response:
+    """A measured frequency response (n,): its error sum is that of weight |value - plant|, squared.
+
+    at: j omega [rad/s] with sample_time 0, e^(j omega T) - 1 behind a hold over sample_time T [s].
+    band: lowest and highest omega [rad/s]; noise: error sum of a perfect plant, 0: unknown.
+    """
+
+    def __init__(
+        self,
+        *,
+        at: NDArray[np.complex128],
+        value: NDArray[np.complex128],
+        weight: NDArray[np.float64],
+        sample_time: float,
+        band: tuple[float, float],
+        noise: float,
+    ) -> None: ...
+    def plant(self, gain: float, poles: NDArray[np.complex128], zeros: NDArray[np.complex128]) -> NDArray[np.complex128]:
+        """What a model shows at these frequencies."""
+
 class Experiment:
-    """Records and their loop: what candidates are simulated against.
+    """Records and their loop, and frequency responses: what candidates are simulated against.
 
     kernels: an instruction set, "" for the machine's best; fused: whether it has an instruction for a b + c.
     Ctrl-C ends long work, and so does an exception that `progress` raises.
     It gets (generations done, best fitness, number of species, (p, q) of the one that leads or (-1, -1)).
     """
 
-    def __init__(self, records: Sequence[Record], loop: Loop, kernels: str = "") -> None: ...
+    def __init__(self, records: Sequence[Record], loop: Loop, kernels: str = "", responses: Sequence[Response] = ()) -> None: ...
     @property
     def kernels(self) -> str: ...
     @property

@@ -99,10 +99,11 @@ def scored(
     lengths: Sequence[int],
     ranges: _core.SearchRanges,
     workers: int,
+    beside: int = 0,
 ) -> list[Candidate]:
-    """The candidates with their BIC under a common noise model."""
+    """The candidates with their BIC under a common noise model; beside: numbers of frequency responses, which are white."""
     costs = [c.cost for c in candidates]
-    count = sum(lengths)
+    count = sum(lengths) + beside
     if noise.order > 0:
         fits = [c.fit for c in candidates]
         whitened = experiment.go_on(fits, ranges, noise.phi, POLICY.whitened_again, tolerance(count), workers)

@@ -11,7 +11,7 @@ from gaident.control.pi import bare_pi
 from gaident.data.record import Record
 from gaident.diagnosis.explain.evidence import velocity_curve
 from gaident.errors import GaidentError
-from gaident.identification.frequency import response_of
+from gaident.identification.response.averaged import response_of
 from gaident.models.model import Model
 from gaident.reporting.runs import run_of
 from gaident.results.diagnosis import Diagnosis

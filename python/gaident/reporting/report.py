@@ -17,7 +17,7 @@ from gaident.data.record import Record
 from gaident.diagnosis.explain.evidence import velocity_curve
 from gaident.errors import GaidentError
 from gaident.files import check_writable, write_whole
-from gaident.identification.frequency import response_of
+from gaident.identification.response.averaged import response_of
 from gaident.reporting.runs import run_of
 from gaident.results.diagnosis import Diagnosis
 from gaident.results.identification import Identification

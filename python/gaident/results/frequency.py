@@ -9,14 +9,14 @@ from numpy.typing import NDArray
 
 from gaident.axis import Text, say
 
-__all__ = ["FrequencyResponse", "Responses"]
+__all__ = ["AveragedResponse", "Responses"]
 
 Vector = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
 
 @dataclass(frozen=True, eq=False)
-class FrequencyResponse:
+class AveragedResponse:
     """An estimate over frequency [Hz], arrays (n,): value [rad/s/(N m)] complex, its standard deviation, coherence 0..1.
 
     std (n,): root of the mean |error|^2 of the complex value; magnitude, and phase times magnitude, deviate by std/sqrt(2) each.
@@ -50,7 +50,7 @@ class FrequencyResponse:
 class Responses:
     """A record's response, that of a model simulated on it, and the linear part's own over `fine` [Hz], (m,)."""
 
-    measured: FrequencyResponse
-    simulated: FrequencyResponse | None
+    measured: AveragedResponse
+    simulated: AveragedResponse | None
     fine: Vector
     model: Complex

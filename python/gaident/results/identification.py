@@ -13,6 +13,7 @@ from gaident.axis import linear_sentences, restored
 from gaident.control.cascade import controller_of
 from gaident.control.controller import Controller
 from gaident.control.pi import bare_pi
+from gaident.data.frequency.response import FrequencyResponse
 from gaident.data.record import Record
 from gaident.errors import GaidentError, check_schema
 from gaident.models.drive_torque import as_differenced, as_old_as_its_velocity, without_age
@@ -90,6 +91,12 @@ class Identification(SavedResult):
         Version of gaident.
     records : tuple of Record
         The data; empty where the identification was loaded from a file.
+    frequencies : int
+        Frequencies of all responses. Of responses alone `samples` is 0 and `rmse` that of the relative error [1].
+    response_digests : tuple of str
+        Digests of the frequency responses, see `FrequencyResponse.digest`.
+    responses : tuple of FrequencyResponse
+        The frequency responses; empty where the identification was loaded from a file.
 
     See Also
     --------
@@ -121,6 +128,9 @@ class Identification(SavedResult):
     controller_numbers: Mapping[str, Estimate] = field(default_factory=dict, hash=False)
     covariance: tuple[tuple[float, ...], ...] | None = None
     records: tuple[Record, ...] = field(default=(), compare=False, repr=False)
+    frequencies: int = 0
+    response_digests: tuple[str, ...] = ()
+    responses: tuple[FrequencyResponse, ...] = field(default=(), compare=False, repr=False)
 
     def __repr__(self) -> str:
         verdict = "falsified" if self.falsified else "undecided" if self.adequacy.undecided else "stands"
@@ -320,6 +330,8 @@ class Identification(SavedResult):
             "seconds": self.seconds,
             "samples": self.samples,
             "digests": list(self.digests),
+            "frequencies": self.frequencies,
+            "response_digests": list(self.response_digests),
             "initial_states": {d: list(s) for d, s in self.initial_states.items()},
             "controller_numbers": {name: asdict(e) for name, e in self.controller_numbers.items()},
             "covariance": None if self.covariance is None else [list(row) for row in self.covariance],
@@ -359,4 +371,6 @@ class Identification(SavedResult):
                 version=data["gaident_version"],
                 controller_numbers={name: Estimate(**e) for name, e in data.get("controller_numbers", {}).items()},
                 covariance=rows_of(data.get("covariance")),
+                frequencies=data.get("frequencies", 0),
+                response_digests=tuple(data.get("response_digests", ())),
             )

@@ -29,7 +29,7 @@ from gaident.models.held_torque import held_mean
 from gaident.models.model import Model
 from gaident.models.simulate import Run, run
 from gaident.policy.table import POLICY
-from gaident.results.frequency import FrequencyResponse, Responses
+from gaident.results.frequency import AveragedResponse, Responses
 
 __all__ = ["measured_response", "response_of", "sampled_response", "simulated_response"]
 
@@ -66,7 +66,7 @@ def response_of(rec: Record, model: Model, controller: PI | None = None) -> Resp
     )
 
 
-def measured_response(rec: Record, controller: PI | None = None) -> FrequencyResponse:
+def measured_response(rec: Record, controller: PI | None = None) -> AveragedResponse:
     """The response that a record shows. controller: of its loop, makes the torque where none is logged; None: open loop.
 
     Raises RecordError where there is neither a torque nor command and controller, for a torque that never changes, and for a loop
@@ -90,7 +90,7 @@ def measured_response(rec: Record, controller: PI | None = None) -> FrequencyRes
     return _estimate(torque, rec.velocity, rec.command, rec.dt)
 
 
-def simulated_response(run: Run, rec: Record) -> FrequencyResponse:
+def simulated_response(run: Run, rec: Record) -> AveragedResponse:
     """The same estimate of a simulated run of that record: what the model would have shown."""
     return _estimate(run.torque, run.velocity, rec.command, rec.dt)
 
@@ -122,7 +122,7 @@ def _averages(windows: int, count: NDArray[np.intp]) -> Vector:
     return np.asarray(windows * count / (pairs(SAME) + 2.0 * (1.0 - 1.0 / windows) * pairs(NEXT)))
 
 
-def _estimate(u: Vector, w: Vector, command: Vector | None, dt: float) -> FrequencyResponse:
+def _estimate(u: Vector, w: Vector, command: Vector | None, dt: float) -> AveragedResponse:
     """From torque u to velocity w; a command that never changes is no instrument."""
     n = len(w)
     size = max(16, min(2 * n // (WINDOWS + 1), LONGEST))  # no decision: a grid: the lines of a spectrum
@@ -158,7 +158,7 @@ def _estimate(u: Vector, w: Vector, command: Vector | None, dt: float) -> Freque
     frequency = np.add.reduceat(f, first) / count
     with np.errstate(divide="ignore"):
         threshold = 1.0 - POLICY.coherence_level ** (1.0 / np.maximum(averages - 1.0, 0.0))
-    return FrequencyResponse(
+    return AveragedResponse(
         frequency=frequency[known],
         value=value[known],
         std=np.nan_to_num(std)[known],
