@@ -206,7 +206,8 @@ void bind_identify(py::module_& m) {
                  const auto all = [](const ComplexArray& a) {
                      return std::span<const std::complex<double>>(a.data(), static_cast<std::size_t>(a.size()));
                  };
-                 return std::make_shared<Response>(all(at), all(value), view(weight), sample_time, band.first, band.second, noise);
+                 return std::make_shared<Response>(all(at), all(value), view(weight), sample_time, band.first, band.second,
+                                                   noise);
              }),
              py::kw_only(), py::arg("at"), py::arg("value"), py::arg("weight"), py::arg("sample_time"), py::arg("band"),
              py::arg("noise"))

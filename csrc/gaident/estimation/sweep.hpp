@@ -34,8 +34,8 @@ struct Chunk {
     static constexpr std::size_t width = double_lanes, per_group = width - 1;
 
     std::size_t record, first, n;
-    std::size_t size;  // of the whole record
-    bool response;     // its errors are independent of each other
+    std::size_t size;                              // of the whole record
+    bool response;                                 // its errors are independent of each other
     std::span<const std::size_t> unknowns;         // of this record
     std::span<const std::vector<double>> columns;  // per group of lanes; see rows()
     std::size_t history;

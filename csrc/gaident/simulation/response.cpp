@@ -36,11 +36,7 @@ struct Lines {
 
 Response::Response(std::span<const std::complex<double>> at, std::span<const std::complex<double>> value,
                    std::span<const double> weight, double sample_time, double slowest, double fastest, double noise)
-    : weight_(weight.begin(), weight.end()),
-      sample_time_(sample_time),
-      slowest_(slowest),
-      fastest_(fastest),
-      noise_(noise) {
+    : weight_(weight.begin(), weight.end()), sample_time_(sample_time), slowest_(slowest), fastest_(fastest), noise_(noise) {
     if (weight.empty() || at.size() != weight.size() || value.size() != weight.size())
         throw std::invalid_argument("response: frequencies, values and weights must have the same length, at least 1");
     if (!(slowest > 0.0) || !(fastest >= slowest)) throw std::invalid_argument("response: its band must be positive");

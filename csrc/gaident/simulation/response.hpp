@@ -19,8 +19,8 @@ class Response {
 public:
     // sample_time: of the hold [s], 0: none. band: its lowest and highest frequency [rad/s]. noise: J of a perfect plant, 0: unknown.
     // Throws std::invalid_argument where the lengths differ or are 0.
-    Response(std::span<const std::complex<double>> at, std::span<const std::complex<double>> value, std::span<const double> weight,
-             double sample_time, double slowest, double fastest, double noise);
+    Response(std::span<const std::complex<double>> at, std::span<const std::complex<double>> value,
+             std::span<const double> weight, double sample_time, double slowest, double fastest, double noise);
 
     std::size_t size() const { return weight_.size(); }
     // Real and imaginary parts are numbers of their own.

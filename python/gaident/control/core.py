@@ -173,7 +173,7 @@ def experiment(
     kernels: str = "",
     responses: Sequence[_core.Response] = (),
 ) -> _core.Experiment:
-    """Records and their loop, and frequency responses, for the genetic search and the local fit; dt: sample time of the log [s]."""
+    """Records, their loop, and frequency responses for the genetic search and the local fit; dt: sample time of the log [s]."""
     return _core.Experiment(records, loop(controller, dt), kernels, responses)
 
 

@@ -24,7 +24,7 @@ def parted(rec: object) -> tuple[list[Record], list[FrequencyResponse]]:
     given = [rec] if isinstance(rec, Record | FrequencyResponse) else list(rec) if isinstance(rec, Sequence) else []
     if not given or not all(isinstance(r, Record | FrequencyResponse) for r in given):
         raise RecordError(
-            f"rec is {type(rec).__name__}: give a gaident.Record or a list of them, at least one; a FrequencyResponse counts as one"
+            f"rec is {type(rec).__name__}: give a gaident.Record or FrequencyResponse, or a list of them, at least one"
         )
     return [r for r in given if isinstance(r, Record)], [r for r in given if isinstance(r, FrequencyResponse)]
 

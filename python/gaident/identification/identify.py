@@ -129,7 +129,7 @@ def identify(
     if responses and not given:
         if controller is not None:
             raise SettingsError(
-                f"controller is {type(controller).__name__}: a frequency response is that of the axis from its torque, whatever the "
+                f"controller is {type(controller).__name__}: a frequency response is that of the axis from its torque, in any "
                 "loop; leave it out"
             )
         space = checked_space(response_space(responses) if space is None else space, None)
@@ -158,8 +158,8 @@ class _Runs:
         if not overflows:
             return result
         evaluations = sum(t.evaluations for t in found)
-        said = f"In {self.settings.arithmetic} {overflows} of {evaluations} candidates left its range or diverged; they count as worst."
-        return replace(result, warnings=(*result.warnings, said))
+        left = f"{overflows} of {evaluations} candidates left its range or diverged; they count as worst."
+        return replace(result, warnings=(*result.warnings, f"In {self.settings.arithmetic} {left}"))
 
 
 def _of_records(

@@ -133,7 +133,7 @@ class StructureSearch(ABC):
         return self.compared(candidates, others)
 
     def compared(self, candidates: list[Candidate], others: list[Candidate]) -> tuple[Assessed, list[Candidate]]:
-        """The winner among fits, and all of them with their BIC; others: chains among them are looked at where it is contradicted."""
+        """The winner among fits, and all of them with their BIC; others: of them chains, where it is contradicted."""
         noise = self.noise_of(min(candidates, key=lambda c: c.cost))
         scores = self.scored(candidates, noise)
         winner = selection.smallest_close(scores)

@@ -96,4 +96,6 @@ class Adequacy:
                 "What the model leaves goes on from frequency to frequency, but is not larger than the stated deviations: the "
                 "measurement's neighbouring errors are alike. The linear model stands."
             )
-        return "What the model leaves of the frequency response is noise: nothing left that this linear model could be blamed for."
+        return (
+            "What the model leaves of the frequency response is noise: nothing left that this linear model could be blamed for."
+        )

@@ -22,6 +22,7 @@ class AveragedResponse:
     std (n,): root of the mean |error|^2 of the complex value; magnitude, and phase times magnitude, deviate by std/sqrt(2) each.
     threshold (n,): the coherence that unrelated signals pass once in twenty. instrument: whether the command was used (joint
     input-output); False: torque to velocity directly (H1). windows: how many; resolution [Hz].
+    given: whether it was given as a response, without a record; then windows and threshold mean nothing.
     """
 
     frequency: Vector
@@ -32,10 +33,13 @@ class AveragedResponse:
     instrument: bool
     windows: int
     resolution: float
+    given: bool = False
 
     @property
     def sentence(self) -> Text:
         """How it was estimated and what to doubt."""
+        if self.given:
+            return Text("The response as it was measured.")
         how = f"{self.windows} half-overlapping windows, resolution {self.resolution:.2g} Hz"
         if self.instrument:
             return Text(f"Joint input-output estimate: cross spectra with the command, free of the loop's bias by noise; {how}.")

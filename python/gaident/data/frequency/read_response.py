@@ -6,6 +6,7 @@ import math
 import os
 import re
 from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -41,7 +42,7 @@ UNITS: dict[str, dict[str, float]] = {
 }
 """Factor to Hz, 1, rad and 1; nan: decibels."""
 
-_UNIT = re.compile(r"(.*?)[\s/_]*[\[(<{/_ ]\s*(khz|hz|rad/s|db|deg|grad|°|rad|%)\s*[\])>}]?", re.IGNORECASE)
+_UNIT = re.compile(r"(.*?)[\s/_]*[\[(<{/_ ]\s*(khz|hz|rad/s|db|deg|grad|°|rad|%|1)\s*[\])>}]?", re.IGNORECASE)
 
 
 def read_response(
@@ -67,7 +68,8 @@ def read_response(
     path : str or path-like
         The file.
     columns : mapping of str to str or int, optional
-        Quantity -> column: frequency, magnitude, phase, real, imaginary, coherence, std. What is not given is guessed by its name.
+        Quantity -> column: frequency, magnitude, phase, real, imaginary, coherence, std. One that is not given is
+        guessed by its name.
     units : mapping of str to str, optional
         Quantity -> unit: frequency "Hz", "kHz" or "rad/s"; magnitude "dB" or "1" (plain numbers); phase "deg" or "rad";
         coherence "1" or "%". What is not given is taken from the column's name.
@@ -123,7 +125,7 @@ def read_response(
         # no decision: a unit: decibels
         size = 10.0 ** (values["magnitude"] / 20.0) if decibels else values["magnitude"] * factor["magnitude"]
         response = size * np.exp(1j * values["phase"] * factor["phase"])
-    more: dict[str, Vector] = {}
+    more: dict[str, Any] = {}
     if "coherence" in found:
         more["coherence"] = values["coherence"] * factor["coherence"]
     if "std" in found:
@@ -139,7 +141,7 @@ def read_response(
         if not below.all():
             notes.append(f"{table.path}: {int(np.sum(~below))} rows from half the sampling frequency on are left out.")
             order = order[below]
-    arrays = {key: array[order] for key, array in more.items()}
+    arrays: dict[str, Any] = {key: array[order] for key, array in more.items()}
     called = file.name if name is None else name
     return FrequencyResponse(frequency[order], scale * response[order], kind=kind, dt=dt, name=called, notes=notes, **arrays)
 
@@ -147,15 +149,17 @@ def read_response(
 def _columns(table: LogTable, given: Mapping[str, str | int]) -> dict[str, Column]:
     """The column of each quantity. Raises ReadError where one is missing."""
     asked = known_keys(given, "columns", list(COLUMNS), (), ReadError)
-    found = {key: table.find(address, key) for key, address in asked.items()}
+    found = {key: table.find(given[key], key) for key in asked}
     free = [column for column in table.columns if column.key not in {c.key for c in found.values()}]
     for key, pattern in COLUMNS.items():
         if key in found:
             continue
-        named = [column for column in free if re.fullmatch(pattern, _parted(column)[0].strip(), re.IGNORECASE)]
+        named = [column for column in free if re.fullmatch(rf"({pattern})(\W.*)?", _parted(column)[0].strip(), re.IGNORECASE)]
         if len(named) > 1:
             names = ", ".join(repr(column.key) for column in named)
-            raise ReadError(f"{table.path}: {len(named)} columns may be the {key}: {names}; say which in {arg('columns', '...', key)}")
+            raise ReadError(
+                f"{table.path}: {len(named)} columns may be the {key}: {names}; say which in {arg('columns', '...', key)}"
+            )
         if named:
             found[key] = named[0]
     parts = ("real", "imaginary") if "real" in found or "imaginary" in found else ("magnitude", "phase")
@@ -187,4 +191,6 @@ def _factor(table: LogTable, quantity: str, column: Column, given: object) -> fl
         return known[unit.strip().casefold()]
     names = " or ".join(repr({"hz": "Hz", "khz": "kHz", "db": "dB"}.get(u, u)) for u in known)
     said = "does not say its unit" if unit is None else f"has the unit {unit!r}"
-    raise ReadError(f"{table.path}: the {quantity} in column {column.key!r} {said}: give {names} in {arg('units', '...', quantity)}")
+    raise ReadError(
+        f"{table.path}: the {quantity} in column {column.key!r} {said}: give {names} in {arg('units', '...', quantity)}"
+    )

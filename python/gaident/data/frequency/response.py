@@ -45,7 +45,8 @@ class FrequencyResponse:
     std : array_like, shape (n,), optional
         Standard deviation of the complex value, sqrt(mean |error|^2), in its unit.
     coherence : array_like, shape (n,), optional
-        Coherence of the measurement, above 0 up to 1. Without `std` it says how much each frequency counts beside the others.
+        Coherence of the measurement, above 0 up to 1.
+        Without `std` it says how much each frequency counts beside the others.
         Without both the errors are taken to be in proportion to the magnitude.
     kind : {"torque to velocity", "torque to position", "torque to acceleration"}
         What was measured.
@@ -53,8 +54,8 @@ class FrequencyResponse:
         Sample time [s], where the torque was held over each sample and the velocity read at the samples: what a drive
         or a controller measures. None: the response of the axis itself, as an analyser in continuous time measures it.
     amplitude : float, optional
-        Amplitude of the torque that excited the axis [N m]. With it several responses of one axis show which way gain and resonance
-        move with the amplitude.
+        Amplitude of the torque that excited the axis [N m].
+        With it several responses of one axis show which way gain and resonance move with the amplitude.
     name : str
         What reports call it.
     notes : sequence of str
@@ -115,7 +116,7 @@ class FrequencyResponse:
         kind = one_of(kind, "kind", KINDS, RecordError)
         frequency = _numbers(frequency_hz, "frequency_hz")
         value = _numbers(response, "response", np.complex128)
-        found = {"response": value}
+        found: dict[str, Any] = {"response": value}
         for key, given in (("std", std), ("coherence", coherence)):
             found[key] = None if given is None else _numbers(given, key)
         for key, array in found.items():
@@ -139,7 +140,9 @@ class FrequencyResponse:
                 _above(found[key], key, "0")
         if found["coherence"] is not None and float(found["coherence"].max()) > 1.0:
             i = int(np.argmax(found["coherence"]))
-            raise RecordError(f"coherence[{i}] = {found['coherence'][i]:g}: it lies between 0 and 1; give it as a share, not in %")
+            raise RecordError(
+                f"coherence[{i}] = {found['coherence'][i]:g}: it lies between 0 and 1; give it as a share, not in %"
+            )
         if dt is not None:
             dt = sample_time(dt)
             if frequency[-1] >= 0.5 / dt:  # no decision: a formula: half the sampling frequency
@@ -182,7 +185,7 @@ class FrequencyResponse:
 
     @property
     def velocity_response(self) -> Complex:
-        """From torque to velocity [rad/s/(N m)], shape (n,): G(f) times (j omega) once for each time it has to be differentiated."""
+        """From torque to velocity [rad/s/(N m)], shape (n,): G(f), times j omega or over it where `kind` is another one."""
         made: Complex = self.response * (1j * self.omega) ** KINDS[self.kind]
         return made
 
@@ -233,9 +236,9 @@ class FrequencyResponse:
             keep &= self.frequency_hz >= positive_number(lowest_hz, "lowest_hz", "Hz", "give a frequency in Hz")
         if highest_hz is not None:
             keep &= self.frequency_hz <= positive_number(highest_hz, "highest_hz", "Hz", "give a frequency in Hz")
-        parts = [None if a is None else a[keep] for a in (self.frequency_hz, self.response, self.std, self.coherence)]
-        same = {"dt": self.dt, "amplitude": self.amplitude, "name": self.name, "notes": self.notes}
-        return FrequencyResponse(*parts, self.kind, **same)  # type: ignore[arg-type]
+        std, coherence = (None if a is None else a[keep] for a in (self.std, self.coherence))
+        same: dict[str, Any] = {"dt": self.dt, "amplitude": self.amplitude, "name": self.name, "notes": self.notes}
+        return FrequencyResponse(self.frequency_hz[keep], self.response[keep], std, coherence, self.kind, **same)
 
     def plot(self, axis: str = "rotary") -> Figure:
         """Draw magnitude, phase and, where it is known, coherence over frequency [Hz].
@@ -250,7 +253,7 @@ class FrequencyResponse:
         matplotlib.figure.Figure
             The picture.
         """
-        return picture("plot_frequency_response", self, None, axis)
+        return picture("plot_frequency_response", (self,), axis=axis)
 
 
 def _numbers(values: ArrayLike, argument: str, kind: type[Any] = np.float64) -> NDArray[Any]:

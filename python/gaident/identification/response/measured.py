@@ -7,7 +7,7 @@ Where r is periodic, with P periods after the first, and R the same in each:
 
     G(k) = sum_p W_p conj(R) / sum_p U_p conj(R),   var G = sum_p |W_p - G U_p|^2 / ((P - 1) P |mean U|^2)
 
-Else by local polynomials (R. Pintelon, J. Schoukens, "System Identification: A Frequency Domain Approach", 2nd ed., 2012, chapter 7):
+Else by local polynomials (R. Pintelon, J. Schoukens, "System Identification: A Frequency Domain Approach", 2nd ed., 2012, ch. 7):
 over the 2 m + 1 lines around line k, by least squares,
 
     [U; W](k + i) = (A_0 + A_1 i + A_2 i^2) R(k + i) + B_0 + B_1 i + B_2 i^2 + noise,   G(k) = A_0w / A_0u
@@ -39,7 +39,10 @@ Complex = NDArray[np.complex128]
 
 PERIODS = 3  # no decision: of statistics: the first settles, two say what the noise is
 EXCITED = 1e-3  # no decision: a grid: of the largest line of a period; smaller ones excite nothing
-NARROW, WIDE = 6, 0.01  # no decision: a grid: lines to either side of a window, and as a share of its frequency where that is more
+NARROW, WIDE = (
+    6,
+    0.01,
+)  # no decision: a grid: lines to either side of a window, and as a share of its frequency where that is more
 UNKNOWN = 6  # no decision: a formula: coefficients of a window
 NEAR = 4  # no decision: a grid: lines to either side that share a deviation, where each has a few periods only
 MOST_LINES = 600  # no decision: memory and time: frequencies of a response
@@ -68,12 +71,14 @@ def frequency_response(rec: Record, controller: Controller | None = None) -> Fre
     rec : Record
         A record with torque and velocity; from 200 lines on, and the more the better it resolves.
     controller : PI or Cascade, optional
-        Of its loop; None: open loop, the torque is independent of the velocity's noise. Without a logged torque it makes the torque.
+        Of its loop; None: open loop, the torque is independent of the velocity's noise.
+        Without a logged torque it makes the torque.
 
     Returns
     -------
     FrequencyResponse
-        With standard deviations and coherence. `dt` is the record's: the torque is held from line to line.
+        With standard deviations and coherence.
+        `dt` is the record's: the torque is held from line to line.
         In a log that is slower than its controller the torque is not; then it is the axis's own, `dt` None, up to 0.4/rec.dt.
 
     Raises
@@ -135,7 +140,9 @@ def frequency_response(rec: Record, controller: Controller | None = None) -> Fre
         places = np.geomspace(1.0, float(len(found)), MOST_LINES) - 1.0
         found = found[np.unique(np.rint(places).astype(int))]
     if len(found) < 8:  # no decision: what an argument may be: a response has so many frequencies at least
-        raise RecordError(f"the record of {len(rec)} lines shows a response at {len(found)} frequencies only: use a longer record")
+        raise RecordError(
+            f"the record of {len(rec)} lines shows a response at {len(found)} frequencies only: use a longer record"
+        )
     return FrequencyResponse(
         lines.frequency[found], value[found], std[found], lines.coherence[found], dt=dt, name=rec.name, notes=notes
     )
@@ -200,7 +207,7 @@ def _local(u: Vector, w: Vector, r: Vector, dt: float) -> _Lines:
         basis = np.stack([own, own * i, own * i**2, np.ones(size), i, i**2], axis=1)
         rows.append((start + half + 1.0, *_window(basis, np.stack([U[part], W[part]], axis=1), r is u)))
         start += size
-    line, value, std, coherence = (np.array(x) for x in zip(*rows, strict=True)) if rows else (np.zeros(0),) * 4
+    line, value, std, coherence = np.array(rows, complex).reshape(-1, 4).T
     how = f"Local polynomials over {2 * NARROW + 1} lines of the spectrum and more, {1.0 / (n * dt):.2g} Hz apart."
     return _Lines(line.real / (n * dt), value, std.real, coherence.real, how)
 

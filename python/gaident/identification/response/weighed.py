@@ -2,8 +2,8 @@
 
     e_k = sqrt(2) scale (G_k - G(s_k; x)) / sigma_k,   sigma_k = sqrt(mean |error of G_k|^2)
 
-so that real and imaginary part each have the variance scale^2: 1 where responses stand alone, that of the whitened velocity beside
-records.
+so that real and imaginary part each have the variance scale^2: 1 where responses stand alone, beside records that of the whitened
+velocity.
 Without a stated deviation sigma is in proportion to `relative_std`, and what a model leaves says how large it is.
 """
 
@@ -33,15 +33,16 @@ NEIGHBOURS = 5  # no decision: a grid: frequencies apart at most; what a missing
 
 @dataclass(frozen=True)
 class Weighed:
-    """A response with the deviation that counts, over its magnitude: `relative_std` times `size`; size 1 where a deviation is stated.
+    """A response with the deviation that counts, over its magnitude: `relative_std` times `size`, 1 where a deviation is stated.
 
-    continuous: whether the loop beside it is the paper's, in which the plant is bilinear.
+    continuous: whether the loop beside it is the paper's, in which the plant is bilinear. delay: of its path [s], taken out.
     """
 
     response: FrequencyResponse
     size: float
     scale: float
     continuous: bool
+    delay: float = 0.0
 
     @property
     def known(self) -> bool:
@@ -50,8 +51,9 @@ class Weighed:
 
     @property
     def value(self) -> Complex:
-        """From torque to velocity."""
-        return self.response.velocity_response
+        """From torque to velocity, without the delay."""
+        made: Complex = self.response.velocity_response * np.exp(1j * self.response.omega * self.delay)
+        return made
 
     @property
     def weight(self) -> Vector:
@@ -63,15 +65,13 @@ class Weighed:
     def core(self) -> _core.Response:
         """For the core."""
         omega, dt = self.response.omega, self.response.dt
-        held = dt is not None and not self.continuous
-        at = np.expm1(1j * omega * dt) if held else 1j * omega
-        if dt is not None and self.continuous:
-            at = 2j / dt * np.tan(0.5 * omega * dt)
+        at = np.asarray(1j * omega, complex)
+        if dt is not None:
+            at = np.asarray(2j / dt * np.tan(0.5 * omega * dt) if self.continuous else np.expm1(1j * omega * dt), complex)
+        hold = 0.0 if dt is None or self.continuous else dt
         noise = 2.0 * len(omega) * self.scale**2 if self.known else 0.0
         band = float(omega[0]), float(omega[-1])
-        return _core.Response(
-            at=at, value=self.value, weight=self.weight, sample_time=dt if held else 0.0, band=band, noise=noise
-        )
+        return _core.Response(at=at, value=self.value, weight=self.weight, sample_time=hold, band=band, noise=noise)
 
     def errors(self, model: Model) -> Complex:
         """e_k of a model, shape (n,)."""
@@ -95,8 +95,8 @@ def weighed(responses: Sequence[FrequencyResponse], continuous: bool, scale: flo
 def assessed_responses(parts: Sequence[Weighed], model: Model, unknowns: int) -> Adequacy:
     """The verdict on a model by what it leaves of responses; unknowns: numbers that were fitted.
 
-    Errors of neighbouring frequencies are independent where only noise is left (Ljung-Box test over the frequencies), and as large as
-    stated (chi-square test).
+    Errors of neighbouring frequencies are independent where only noise is left (Ljung-Box test over the frequencies), and as
+    large as stated (chi-square test).
     Where no deviation is stated the first alone decides.
     """
     found = [p.errors(model) / p.scale for p in parts]
