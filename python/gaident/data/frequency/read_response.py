@@ -158,7 +158,7 @@ def _columns(table: LogTable, given: Mapping[str, str | int]) -> dict[str, Colum
         if len(named) > 1:
             names = ", ".join(repr(column.key) for column in named)
             raise ReadError(
-                f"{table.path}: {len(named)} columns may be the {key}: {names}; say which in {arg('columns', '...', key)}"
+                f"{table.path}: {len(named)} columns may be the {key}: {names}; say which in {_given('columns', key)}"
             )
         if named:
             found[key] = named[0]
@@ -166,11 +166,16 @@ def _columns(table: LogTable, given: Mapping[str, str | int]) -> dict[str, Colum
     for key in ("frequency", *parts):
         if key not in found:
             raise ReadError(
-                f"{table.path}: no column is known to be the {key}; {table.said()}; name it in {arg('columns', '...', key)}"
+                f"{table.path}: no column is known to be the {key}; {table.said()}; name it in {_given('columns', key)}"
             )
     for key in ("magnitude", "phase") if parts[0] == "real" else ():
         found.pop(key, None)
     return found
+
+
+def _given(argument: str, key: str) -> str:
+    """How a message names an argument; the command line has an option of its own for responses."""
+    return arg(f"response_{argument}", "...", key, f"{argument}={{{key!r}: ...}}")
 
 
 def _parted(column: Column) -> tuple[str, str | None]:
@@ -191,6 +196,4 @@ def _factor(table: LogTable, quantity: str, column: Column, given: object) -> fl
         return known[unit.strip().casefold()]
     names = " or ".join(repr({"hz": "Hz", "khz": "kHz", "db": "dB"}.get(u, u)) for u in known)
     said = "does not say its unit" if unit is None else f"has the unit {unit!r}"
-    raise ReadError(
-        f"{table.path}: the {quantity} in column {column.key!r} {said}: give {names} in {arg('units', '...', quantity)}"
-    )
+    raise ReadError(f"{table.path}: the {quantity} in column {column.key!r} {said}: give {names} in {_given('units', quantity)}")

@@ -76,7 +76,8 @@ def chapters(idn: Identification, view: View, drawn: Charts) -> list[Section]:
     """All of them."""
     noise, sentence = idn.adequacy.noise_std, tag("p", typeset(idn.adequacy.sentence))
     if idn.of_responses:
-        shown = drawn.put(response_chart(view.response, view.axis)) if view.response is not None else ""
+        again = "The diagram needs the frequency response: a saved result does not contain it. Identify it again with --report."
+        shown = drawn.put(response_chart(view.response, view.axis)) if view.response else box(tag("p", again), kind="quiet")
         first = [Section("measured", "Measured against the model", shown), Section("wrong", "What is wrong", sentence)]
     else:
         first = [measured_section(view, noise, drawn), missing_section(view, noise, drawn, sentence)]
