@@ -32,7 +32,7 @@ from gaident.identification.replay.timed_record import plain_of
 from gaident.identification.response.response_search import ResponseSearch, distinct_responses, response_space, told_of
 from gaident.identification.response.weighed import assessed_responses, weighed
 from gaident.identification.selection import Candidate
-from gaident.identification.structure_search import Assessed, ProgressCallback, StructureSearch
+from gaident.identification.structure_search import PERCENT, Assessed, ProgressCallback, StructureSearch
 from gaident.models.drive_torque import as_differenced, without_age
 from gaident.models.search_space import SearchSpace
 from gaident.models.starts import noise_std, starts_moving
@@ -305,7 +305,7 @@ class RecordSearch(StructureSearch):
         states = {d: tuple(x.tolist()) for d, x in zip(self.digests, self.states(best.candidate), strict=True) if len(x)}
         return {
             "rmse": float(np.sqrt(error_sum / self.samples)),
-            "fit_percent": float(100.0 * (1.0 - np.sqrt(error_sum / spread))) if spread > 0.0 else float("nan"),
+            "fit_percent": PERCENT * (1.0 - math.sqrt(error_sum / spread)) if spread > 0.0 else math.nan,
             "samples": self.samples,
             "digests": tuple(self.digests),
             "initial_states": states,

@@ -24,7 +24,7 @@ from gaident.identification.noise import Autoregression, autoregression_of, high
 from gaident.models.model import Model
 from gaident.policy.table import POLICY
 
-__all__ = ["Candidate", "is_chain", "noise_of", "scored", "smallest_close", "smallest_mechanism", "tolerance"]
+__all__ = ["Candidate", "charged", "is_chain", "noise_of", "scored", "smallest_close", "smallest_mechanism", "tolerance"]
 
 
 @dataclass(frozen=True)
@@ -111,9 +111,13 @@ def scored(
         count -= noise.order * len(lengths)  # the first samples of each record, whose past is missing
     found = []
     for c, cost in zip(candidates, costs, strict=True):
-        own = bic(cost / count, count, c.size + len(c.starts))
-        found.append(replace(c, bic=own + POLICY.rival_margin * cancellations(c.fit.poles.tolist(), c.fit.zeros.tolist())))
+        found.append(charged(c, bic(cost / count, count, c.size + len(c.starts))))
     return found
+
+
+def charged(c: Candidate, own: float) -> Candidate:
+    """The candidate with its BIC: its own, and what the poles and zeros cost that cancel each other."""
+    return replace(c, bic=own + POLICY.rival_margin * cancellations(c.fit.poles.tolist(), c.fit.zeros.tolist()))
 
 
 def tolerance(samples: int) -> float:

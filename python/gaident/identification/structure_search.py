@@ -32,12 +32,13 @@ from gaident.results.settings import Settings
 from gaident.results.structures import Rival, Structure, TrialOutcome
 from gaident.version import version
 
-__all__ = ["Assessed", "ProgressCallback", "StructureSearch"]
+__all__ = ["PERCENT", "Assessed", "ProgressCallback", "StructureSearch"]
 
 Vector = NDArray[np.float64]
 ProgressCallback = Callable[[float, str], None]
 
 FINAL_TOLERANCE = 1e-9  # no decision: of a solver
+PERCENT = 100.0  # no decision: a unit
 
 
 @dataclass(frozen=True)

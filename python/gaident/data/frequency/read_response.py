@@ -33,12 +33,12 @@ COLUMNS = {
 }
 """What a column's first word is, for each quantity."""
 
+_DEGREE = math.pi / 180.0  # no decision: a unit; rad
 UNITS: dict[str, dict[str, float]] = {
-    # no decision: units
-    "frequency": {"hz": 1.0, "khz": 1e3, "rad/s": 0.5 / math.pi},
+    "frequency": {"hz": 1.0, "khz": 1e3, "rad/s": 0.5 / math.pi},  # no decision: a unit
     "magnitude": {"db": math.nan, "1": 1.0},
-    "phase": {"deg": math.pi / 180.0, "°": math.pi / 180.0, "grad": math.pi / 180.0, "rad": 1.0},
-    "coherence": {"1": 1.0, "%": 0.01},
+    "phase": {"deg": _DEGREE, "°": _DEGREE, "grad": _DEGREE, "rad": 1.0},
+    "coherence": {"1": 1.0, "%": 0.01},  # no decision: a unit
 }
 """Factor to Hz, 1, rad and 1; nan: decibels."""
 
@@ -68,8 +68,8 @@ def read_response(
     path : str or path-like
         The file.
     columns : mapping of str to str or int, optional
-        Quantity -> column: frequency, magnitude, phase, real, imaginary, coherence, std. One that is not given is
-        guessed by its name.
+        Quantity -> column: frequency, magnitude, phase, real, imaginary, coherence, std.
+        One that is not given is guessed by its name.
     units : mapping of str to str, optional
         Quantity -> unit: frequency "Hz", "kHz" or "rad/s"; magnitude "dB" or "1" (plain numbers); phase "deg" or "rad";
         coherence "1" or "%". What is not given is taken from the column's name.

@@ -162,8 +162,6 @@ class FrequencyResponse:
             "notes": tuple(texts(notes)),
         }
         for key, content in fields.items():
-            if isinstance(content, np.ndarray):
-                content.flags.writeable = False
             object.__setattr__(self, key, content)
 
     def __setattr__(self, key: str, value: object) -> None:
@@ -262,7 +260,7 @@ def _numbers(values: ArrayLike, argument: str, kind: type[Any] = np.float64) -> 
         array = np.asarray(values)
         if array.dtype.kind not in ("iufc" if kind is np.complex128 else "iuf"):
             raise TypeError(f"dtype {array.dtype}")
-        copy: NDArray[Any] = np.array(array, dtype=kind)
+        copy = np.array(array, dtype=kind)
     except (TypeError, ValueError) as reason:
         what = "complex" if kind is np.complex128 else "real"
         raise RecordError(f"{argument} is {values!r:.60} ({reason}): give {what} numbers, one for each frequency") from None
@@ -274,6 +272,7 @@ def _numbers(values: ArrayLike, argument: str, kind: type[Any] = np.float64) -> 
     if copy.size and float(np.abs(copy).max()) > LARGEST:
         i = int(np.argmax(np.abs(copy)))
         raise RecordError(f"{argument}[{i}] = {copy[i]:g} is beyond {LARGEST:g}: correct its unit")
+    copy.flags.writeable = False
     return copy
 
 

@@ -39,10 +39,8 @@ Complex = NDArray[np.complex128]
 
 PERIODS = 3  # no decision: of statistics: the first settles, two say what the noise is
 EXCITED = 1e-3  # no decision: a grid: of the largest line of a period; smaller ones excite nothing
-NARROW, WIDE = (
-    6,
-    0.01,
-)  # no decision: a grid: lines to either side of a window, and as a share of its frequency where that is more
+NARROW = 6  # no decision: a grid: lines to either side of a window, two for each coefficient
+WIDE = 0.01  # no decision: a grid: the same as a share of the window's frequency, where that is more
 UNKNOWN = 6  # no decision: a formula: coefficients of a window
 NEAR = 4  # no decision: a grid: lines to either side that share a deviation, where each has a few periods only
 MOST_LINES = 600  # no decision: memory and time: frequencies of a response
@@ -197,7 +195,7 @@ def _local(u: Vector, w: Vector, r: Vector, dt: float) -> _Lines:
     rows: list[tuple[float, complex, float, float]] = []
     start = 0
     while True:
-        half = max(NARROW, int(WIDE * start))
+        half = _half(start)
         size = 2 * half + 1
         if start + size > len(R):
             break
@@ -212,11 +210,17 @@ def _local(u: Vector, w: Vector, r: Vector, dt: float) -> _Lines:
     return _Lines(line.real / (n * dt), value, std.real, coherence.real, how)
 
 
+def _half(line: int) -> int:
+    """Lines to either side of a window that begins at a line."""
+    return NARROW if WIDE * line < NARROW else int(WIDE * line)
+
+
 def _window(basis: Complex, signals: Complex, open_loop: bool) -> tuple[complex, float, float]:
     """(G, its standard deviation, coherence) at the middle of a window; signals: torque and velocity (lines, 2)."""
     q, triangle = np.linalg.qr(basis)
     size = np.abs(np.diag(triangle))
-    if not float(size.min()) > 1e-6 * float(size.max()):  # rounding: instrument and start are one there
+    # no decision: rounding: instrument and start are one there
+    if not float(size.min()) > 1e-6 * float(size.max()):
         return 1.0 + 0.0j, math.inf, 0.0
     found = np.linalg.solve(triangle, q.conj().T @ signals)
     left = signals - basis @ found

@@ -21,13 +21,16 @@ from gaident.identification.noise import Autoregression
 from gaident.identification.response.delay import SMALL, STEPS, delay_step, freed, starts
 from gaident.identification.response.weighed import assessed_responses, weighed
 from gaident.identification.selection import Candidate
-from gaident.identification.structure_search import Assessed, ProgressCallback, StructureSearch
+from gaident.identification.structure_search import PERCENT, Assessed, ProgressCallback, StructureSearch
 from gaident.models.search_space import SearchSpace
 from gaident.policy.table import POLICY
 from gaident.results.estimate import Estimate
 from gaident.results.settings import Settings
 
 __all__ = ["ResponseSearch", "distinct_responses", "response_space", "told_of"]
+
+
+DIGITS = 1e-7  # no decision: rounding: of a value that is written with seven digits
 
 
 def distinct_responses(responses: Sequence[FrequencyResponse]) -> list[FrequencyResponse]:
@@ -139,7 +142,12 @@ class ResponseSearch(StructureSearch):
 
     def scored(self, candidates: Sequence[Candidate], noise: Autoregression, in_part: bool = False) -> list[Candidate]:
         """See `StructureSearch`."""
-        return selection.scored(self.experiment, candidates, noise, [self.count], self.ranges, self.workers)
+        # What is less than a value's last digits is rounding, which no structure explains.
+        least = DIGITS**2 * sum(float(np.sum(np.abs(p.weight * p.value) ** 2)) for p in self.parts)
+        costs = [c.cost if c.cost > least else least for c in candidates]
+        return [
+            selection.charged(c, bic(cost / self.count, self.count, c.size)) for c, cost in zip(candidates, costs, strict=True)
+        ]
 
     def assessed(self, c: Candidate) -> Assessed:
         """See `StructureSearch`; deviations are those that are stated, or larger where what is left is."""
@@ -159,7 +167,7 @@ class ResponseSearch(StructureSearch):
         size = sum(float(np.sum(np.abs(p.weight * p.value) ** 2)) for p in self.parts)
         return {
             "rmse": float(np.sqrt(np.mean(relative**2))),
-            "fit_percent": 100.0 * (1.0 - math.sqrt(best.error_sum / size)),
+            "fit_percent": PERCENT * (1.0 - math.sqrt(best.error_sum / size)),
             "samples": 0,
             "digests": (),
             "initial_states": {},
@@ -208,11 +216,11 @@ def compared_notes(responses: Sequence[FrequencyResponse]) -> list[Text]:
     for r in (small, large):
         inside = (r.omega >= low) & (r.omega <= high)
         curves.append((r.omega[inside], (np.abs(r.velocity_response) * r.omega)[inside], r.relative_std[inside]))
-    if min(len(omega) for omega, _, _ in curves) < 3:  # no decision: a formula: a third of them has one
+    if min(len(omega) for omega, _, _ in curves) < 3:  # no decision: a formula: a third of them is one at least
         return []
     gains, errors, peaks, spacing = [], [], [], []
     for (omega, size, off), r in zip(curves, (small, large), strict=True):
-        part = max(1, len(omega) // 3)  # no decision: which part the sentence speaks of
+        part = len(omega) // 3  # no decision: which part the sentence speaks of
         gains.append(float(np.median(size[:part])))
         # A median's deviation is sqrt(pi/2) that of a mean.
         stated = float(np.median(off[:part])) if r.std is not None else float(np.std(np.log(size[:part])))
@@ -226,7 +234,7 @@ def compared_notes(responses: Sequence[FrequencyResponse]) -> list[Text]:
     found = []
     if abs(change) > off_by:
         way, why = ("larger", "dry friction or a dead band") if change > 0.0 else ("smaller", "a limit of the {torque}")
-        gain = f"the gain at low frequencies is {100.0 * abs(change):.2g} % {way}"
+        gain = f"the gain at low frequencies is {PERCENT * abs(change):.2g} % {way}"
         found.append(say(f"{between} {gain}; {why} would do that. {last}"))
     if abs(peaks[1] - peaks[0]) > max(spacing):
         why = "a gap or a hardening coupling" if peaks[1] > peaks[0] else "friction in the coupling or a softening one"
