@@ -26,7 +26,7 @@ def bode(tmp_path: Path) -> Path:
 
 def test_a_response_is_identified_and_saved(bode: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     saved, picture = tmp_path / "axis.json", tmp_path / "axis.png"
-    units = ["--response-units", "magnitude=1", "--quiet"]
+    units = ["--response-units", "magnitude=1"]
     assert main(["identify", "--response", str(bode), *units, "--out", str(saved), "--plot", str(picture)]) == 0
     said = capsys.readouterr().out
     assert "(p,q) = (1,0)" in said and "40 frequencies of 1 response" in said
