@@ -32,7 +32,7 @@ def test_a_response_is_identified_and_saved(bode: Path, tmp_path: Path, capsys: 
     assert "(p,q) = (1,0)" in said and "40 frequencies of 1 response" in said
     found = ga.load(saved)
     assert isinstance(found, ga.Identification) and found.of_responses
-    assert found.mechanics.J == pytest.approx(2e-3, rel=0.01)
+    assert pytest.approx(2e-3, rel=0.01) == found.mechanics.J
     assert picture.stat().st_size > 10_000
     assert main(["identify", "--response", str(bode), *units, "--json"]) == 0
     assert json.loads(capsys.readouterr().out)["frequencies"] == 40
