@@ -107,7 +107,7 @@ wheel: .venv/.released ## this machine's wheel, installed and tried in an empty 
 	@for name in cc c++ gcc g++ clang cmake ninja make; do ! $(WITHOUT_COMPILER) /bin/sh -c "command -v $$name" || exit 1; done
 	cd $(WHEEL)/out && $(WITHOUT_COMPILER) gaident doctor
 	cd $(WHEEL)/out && $(WITHOUT_COMPILER) gaident demo --quiet --out demo
-	$(WHEEL)/bare/bin/python -m pip install --quiet --only-binary :all: "$$(echo $(WHEEL)/repaired/*.whl)[pictures]" pytest hypothesis
+	$(WHEEL)/bare/bin/python -m pip install --quiet --only-binary :all: "$$(echo $(WHEEL)/repaired/*.whl)[pictures]" pytest hypothesis "mpmath==1.3.*"
 	$(WITHOUT_COMPILER) $(WHEEL)/bare/bin/python -m pytest -q -p no:cacheprovider $(WHEEL_TESTS)
 	@ls -l $(WHEEL)/repaired/*.whl
 
