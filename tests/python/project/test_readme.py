@@ -9,6 +9,7 @@ import pytest
 
 import gaident
 from gaident.cli import COMMANDS
+from gaident.cli.examination import _FOR_DEVELOPERS
 from gaident.cli.options import parser_of
 from places import ROOT
 
@@ -53,6 +54,15 @@ def test_every_call_in_the_changes_is_there() -> None:
     calls = [*re.findall(r"`ga\.(\w+)", CHANGES), *re.findall(r"`gaident (\w+)", CHANGES)]
     assert len(calls) > 10
     assert not [name for name in calls if name not in gaident.__all__ and name not in COMMANDS]
+
+
+def test_every_extra_says_its_size() -> None:
+    """Those that only developers need are left out, as `gaident doctor` leaves them out."""
+    table = (ROOT / "pyproject.toml").read_text(encoding="utf-8").split("[project.optional-dependencies]")[1].split("\n[")[0]
+    extras = {*re.findall(r"^(\w+) = \[", table, re.MULTILINE)} - _FOR_DEVELOPERS
+    assert {"pictures", "pandas", "formats"} <= extras
+    page = (ROOT / "docs" / "install.md").read_text(encoding="utf-8")
+    assert {*re.findall(r"^\| `(\w+)` \| [^|]+ \| \d+ \| \d+ \|", page, re.MULTILINE)} == extras
 
 
 def test_make_knows_its_targets() -> None:
