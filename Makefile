@@ -35,7 +35,7 @@ SOURCES := pyproject.toml CMakeLists.txt LICENSE README.md \
 ifndef SIDE_BY_SIDE
 .NOTPARALLEL:
 endif
-.PHONY: help install demo test bench real embedded wheel tidy docs lint test-cpp test-python clean build-checked test-checked test-sanitized
+.PHONY: help install demo test bench real embedded wheel windows tidy docs lint test-cpp test-python clean build-checked test-checked test-sanitized
 .DEFAULT_GOAL := help
 
 help: ## list the commands
@@ -110,6 +110,14 @@ wheel: .venv/.released ## this machine's wheel, installed and tried in an empty 
 	$(WHEEL)/bare/bin/python -m pip install --quiet --only-binary :all: "$$(echo $(WHEEL)/repaired/*.whl)[pictures]" pytest hypothesis "mpmath==1.3.*"
 	$(WITHOUT_COMPILER) $(WHEEL)/bare/bin/python -m pytest -q -p no:cacheprovider $(WHEEL_TESTS)
 	@ls -l $(WHEEL)/repaired/*.whl
+
+# Only the programs: what ctest has beside them calls a shell. -O1: half the compile time of -O3, the same bits.
+windows: .venv/.tools ## the C++ tests as Windows programs under Wine, for which Debian has g++-mingw-w64-x86-64-posix and wine
+	@mkdir -p build/windows
+	$(CMAKE) -B build/windows --toolchain tests/cpp/mingw.cmake -DGAIDENT_BENCH=OFF -DGAIDENT_WERROR=OFF -DCMAKE_CXX_FLAGS_RELEASE=-O1 \
+		> build/windows/configure.log || { cat build/windows/configure.log; exit 1; }
+	$(BIN)/cmake --build build/windows
+	WINEDEBUG=-all WINEPREFIX="$(abspath build/windows/wine)" $(CTEST) build/windows -R '^test_'
 
 tidy: .venv/.tidied ## repair and format the Python and C++ sources
 	$(BIN)/ruff check --fix-only .
