@@ -61,7 +61,7 @@ def test_every_extra_says_its_size() -> None:
     table = (ROOT / "pyproject.toml").read_text(encoding="utf-8").split("[project.optional-dependencies]")[1].split("\n[")[0]
     extras = {*re.findall(r"^(\w+) = \[", table, re.MULTILINE)} - _FOR_DEVELOPERS
     assert {"pictures", "pandas", "formats"} <= extras
-    page = (ROOT / "docs" / "install.md").read_text(encoding="utf-8")
+    page = (ROOT / "docs/install.md").read_text(encoding="utf-8")
     assert {*re.findall(r"^\| `(\w+)` \| [^|]+ \| \d+ \| \d+ \|", page, re.MULTILINE)} == extras
 
 
