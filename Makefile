@@ -35,7 +35,7 @@ SOURCES := pyproject.toml CMakeLists.txt LICENSE README.md \
 ifndef SIDE_BY_SIDE
 .NOTPARALLEL:
 endif
-.PHONY: help install demo test bench real embedded tidy docs lint test-cpp test-python clean build-checked test-checked test-sanitized
+.PHONY: help install demo test bench real embedded wheel windows tidy docs lint test-cpp test-python clean build-checked test-checked test-sanitized
 .DEFAULT_GOAL := help
 
 help: ## list the commands
@@ -51,10 +51,11 @@ test: ## every test, C++ and Python
 	@$(MAKE) --no-print-directory --jobs=2 --output-sync=target SIDE_BY_SIDE=yes .venv/.requirements build-checked
 	@$(MAKE) --no-print-directory test-checked test-python
 
-lint: .venv/.requirements .venv/.tidied ## ruff and mypy
+lint: .venv/.requirements .venv/.tidied ## ruff and mypy, what Windows has otherwise included
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
+	$(BIN)/mypy --platform win32 python/gaident/files.py
 
 test-cpp: test-checked test-sanitized
 
@@ -89,6 +90,35 @@ embedded: ## the search in a drive, on two emulated Cortex-M boards, and the rec
 	@if csrc/embedded/tools.sh arm64; then $(MAKE) --no-print-directory --jobs=$(JOBS) -f csrc/embedded/arm64.mk OUT=build/embedded; \
 		else echo "ARM64 left out: its tools do not install here" >&2; fi
 
+# What a user gets who has no compiler: only the environment's own programs are on the path. Without the extra "pictures" the demo
+# runs, with it and what they need the tests in WHEEL_TESTS.
+WHEEL := build/wheel
+WHEEL_TESTS := $(addprefix tests/python/,models/test_simulate.py data/test_record.py data/test_read.py show/test_saved_0_1.py \
+	cli/test_no_pictures.py trust/test_files.py)
+WITHOUT_COMPILER = env -u GAIDENT_DATA PATH="$(abspath $(WHEEL)/bare/bin)"
+
+wheel: .venv/.released ## this machine's wheel, installed and tried in an empty environment without a compiler
+	@rm -rf $(WHEEL) && mkdir -p $(WHEEL)/out
+	$(BIN)/python -m pip wheel --quiet --no-deps $(PACKAGE) --wheel-dir $(WHEEL)/built .
+	PATH="$(abspath $(BIN)):$$PATH" $(BIN)/auditwheel repair --wheel-dir $(WHEEL)/repaired $(WHEEL)/built/*.whl
+	$(BIN)/python -m twine check --strict $(WHEEL)/repaired/*.whl
+	$(PYTHON) -m venv $(WHEEL)/bare
+	$(WHEEL)/bare/bin/python -m pip install --quiet --only-binary :all: $(WHEEL)/repaired/*.whl
+	@for name in cc c++ gcc g++ clang cmake ninja make; do ! $(WITHOUT_COMPILER) /bin/sh -c "command -v $$name" || exit 1; done
+	cd $(WHEEL)/out && $(WITHOUT_COMPILER) gaident doctor
+	cd $(WHEEL)/out && $(WITHOUT_COMPILER) gaident demo --quiet --out demo
+	$(WHEEL)/bare/bin/python -m pip install --quiet --only-binary :all: "$$(echo $(WHEEL)/repaired/*.whl)[pictures]" pytest hypothesis "mpmath==1.3.*"
+	$(WITHOUT_COMPILER) $(WHEEL)/bare/bin/python -m pytest -q -p no:cacheprovider $(WHEEL_TESTS)
+	@ls -l $(WHEEL)/repaired/*.whl
+
+# Only the programs: what ctest has beside them calls a shell. -O1: half the compile time of -O3, the same bits.
+windows: .venv/.tools ## the C++ tests as Windows programs under Wine, for which Debian has g++-mingw-w64-x86-64-posix and wine
+	@mkdir -p build/windows
+	$(CMAKE) -B build/windows --toolchain tests/cpp/mingw.cmake -DGAIDENT_BENCH=OFF -DGAIDENT_WERROR=OFF -DCMAKE_CXX_FLAGS_RELEASE=-O1 \
+		> build/windows/configure.log || { cat build/windows/configure.log; exit 1; }
+	$(BIN)/cmake --build build/windows
+	WINEDEBUG=-all WINEPREFIX="$(abspath build/windows/wine)" $(CTEST) build/windows -R '^test_'
+
 tidy: .venv/.tidied ## repair and format the Python and C++ sources
 	$(BIN)/ruff check --fix-only .
 	$(BIN)/ruff format .
@@ -120,7 +150,7 @@ listed = $(BIN)/python -c 'import ast, re; print(*ast.literal_eval(re.search(r"(
 	@touch $@
 
 .venv/.installed: .venv/.tools $(SOURCES)
-	$(PIP_INSTALL) $(PACKAGE) .
+	$(PIP_INSTALL) $(PACKAGE) ".[pictures]"
 	@touch $@
 
 # What the tests need, and the package built for them, apart: the first waits for the network, the second for the compiler.
@@ -139,6 +169,11 @@ listed = $(BIN)/python -c 'import ast, re; print(*ast.literal_eval(re.search(r"(
 .venv/.documented: .venv/.installed
 	@$(call listed,docs) > .venv/docs-requires.txt
 	$(PIP_INSTALL) -r .venv/docs-requires.txt
+	@touch $@
+
+.venv/.released: .venv/.tools
+	@$(call listed,release) > .venv/release-requires.txt
+	$(PIP_INSTALL) -r .venv/release-requires.txt
 	@touch $@
 
 .venv/.tidied: .venv/.tools

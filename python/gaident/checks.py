@@ -1,8 +1,9 @@
-"""Checks that several rooms share: a number, a name out of a list, the keys of a dictionary."""
+"""Checks that several rooms share: a number, a name out of a list, the keys of a dictionary, a library that is there."""
 
 from __future__ import annotations
 
 import difflib
+import importlib.util
 import math
 import os
 from collections.abc import Iterable, Mapping
@@ -47,6 +48,14 @@ def checked_path(value: object, name: str = "path", error: type[GaidentError] = 
     if "\0" in text:
         raise error(f"{name} is {text!r:.80}: no file's name contains the character NUL; correct it")
     return Path(text)
+
+
+def check_installed(modules: Iterable[str], extra: str, what: str) -> None:
+    """Raise GaidentError where one of the modules that `what` needs is not there; imports none of them."""
+    missing = [name for name in modules if importlib.util.find_spec(name) is None]
+    if missing:
+        needed = f"{what} needs {' and '.join(missing)}, which {'are' if len(missing) > 1 else 'is'} not installed"
+        raise GaidentError(f'{needed}: pip install "gaident[{extra}]"')
 
 
 def one_of(value: object, name: str, allowed: Iterable[str], error: type[GaidentError]) -> str:

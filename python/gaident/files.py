@@ -1,27 +1,48 @@
-"""Files that appear whole or not at all."""
+"""Files that appear whole or not at all, and locks.
+
+The only module that calls what Windows has not, or has otherwise.
+There a file that is open cannot be removed or replaced, so that no lock has to say that it is in use.
+"""
 
 from __future__ import annotations
 
 import contextlib
 import errno
-import fcntl
 import os
 import secrets
 import stat
+import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
 from gaident.checks import checked_path
 
-__all__ = ["check_writable", "write_whole"]
+if sys.platform == "win32":
+    import msvcrt
+else:
+    import fcntl
+
+__all__ = ["check_writable", "lock_alone", "write_whole"]
 
 _PREFIX, _SUFFIX = ".gaident-", ".part"
+_BINARY: int = getattr(os, "O_BINARY", 0)  # no decision: Windows, where ends of lines are changed without it
 
 
 def check_writable(path: str | os.PathLike[str]) -> None:
     """Raise what `write_whole` would raise for this path, before the work whose result is written there."""
     _place(path)
+
+
+def lock_alone(descriptor: int) -> None:
+    """Lock an open file until it is closed; raises BlockingIOError where another process has locked it."""
+    if sys.platform == "win32":
+        try:
+            msvcrt.locking(descriptor, msvcrt.LK_NBLCK, 1)
+        except OSError as error:
+            raise BlockingIOError(errno.EWOULDBLOCK, "another process has locked the file") from error
+    else:
+        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
 
 
 def write_whole(path: str | os.PathLike[str], content: bytes) -> None:
@@ -51,14 +72,13 @@ def write_whole(path: str | os.PathLike[str], content: bytes) -> None:
         _write_in_place(target, content)
         return
     _remove_leftovers(target.parent)
-    with _temporary(target.parent, 0o666 if found is None else 0o600) as (descriptor, temporary):
-        if found is not None:
+    with _renamed(target, 0o666 if found is None else 0o600) as descriptor:
+        if found is not None and sys.platform != "win32":
             with contextlib.suppress(PermissionError):  # only root gives files away; the content counts
                 os.fchown(descriptor, found.st_uid, found.st_gid)
             os.fchmod(descriptor, found.st_mode & 0o777)
         _write_all(descriptor, content)
         os.fsync(descriptor)
-        temporary.replace(target)
     with contextlib.suppress(OSError):  # some file systems cannot do this for a folder
         _sync_folder(target.parent)
 
@@ -90,6 +110,9 @@ def _stat_of(path: Path) -> os.stat_result | None:
 
 
 def _write_in_place(path: Path, content: bytes) -> None:
+    if sys.platform == "win32":
+        path.write_bytes(content)
+        return
     # Without waiting, a pipe that nobody reads is an error and not a wait without end.
     descriptor = os.open(path, os.O_WRONLY | os.O_NONBLOCK | os.O_NOCTTY)
     try:
@@ -106,33 +129,44 @@ def _write_all(descriptor: int, content: bytes) -> None:
 
 
 @contextmanager
-def _temporary(folder: Path, mode: int) -> Iterator[tuple[int, Path]]:
-    """A new file of a name that no other write has, locked while it is open; it is removed unless it was renamed."""
+def _renamed(target: Path, mode: int) -> Iterator[int]:
+    """A new file of a name that no other write has, locked while it is open; it gets the target's name, or is removed."""
     while True:
-        path = folder / f"{_PREFIX}{secrets.token_hex(8)}{_SUFFIX}"
-        descriptor = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL, mode)
+        path = target.parent / f"{_PREFIX}{secrets.token_hex(8)}{_SUFFIX}"
+        descriptor = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL | _BINARY, mode)
+        whole = False
         try:
-            with contextlib.suppress(OSError):  # a file system without locks: leftovers stay there
-                fcntl.flock(descriptor, fcntl.LOCK_EX)
+            if sys.platform != "win32":
+                with contextlib.suppress(OSError):  # a file system without locks: leftovers stay there
+                    fcntl.flock(descriptor, fcntl.LOCK_EX)
             # Another write may have taken the file for a leftover before it was locked.
             if os.fstat(descriptor).st_nlink:
-                yield descriptor, path
+                yield descriptor
+                whole = True
+                if sys.platform != "win32":
+                    path.replace(target)  # while it is locked
                 return
         finally:
-            path.unlink(missing_ok=True)
             os.close(descriptor)
+            try:
+                if whole and sys.platform == "win32":
+                    path.replace(target)  # an open file gets no other name there
+            finally:
+                path.unlink(missing_ok=True)
 
 
 def _remove_leftovers(folder: Path) -> None:
     """Remove what writes left that were killed: files of such a name that no process has locked."""
     for path in folder.glob(f"{_PREFIX}*{_SUFFIX}"):
+        # On Windows, where none is told from one that is being written, what was killed stays.
         with contextlib.suppress(OSError):
-            descriptor = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_NOFOLLOW)
-            try:
-                fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-                path.unlink()
-            finally:
-                os.close(descriptor)
+            if sys.platform != "win32":
+                descriptor = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_NOFOLLOW)
+                try:
+                    fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+                    path.unlink()
+                finally:
+                    os.close(descriptor)
 
 
 def _sync_folder(folder: Path) -> None:

@@ -25,7 +25,7 @@ struct FloatPair {
         return normal(sum, error + (a.lo + b.lo));
     }
     friend FloatPair operator*(FloatPair a, FloatPair b) {
-        const float product = a.hi * b.hi, error = std::fma(a.hi, b.hi, -product);
+        const float product = a.hi * b.hi, error = gaident::fma(a.hi, b.hi, -product);
         return normal(product, error + (a.hi * b.lo + a.lo * b.hi));
     }
     friend FloatPair fma(FloatPair a, FloatPair b, FloatPair c) { return c + a * b; }

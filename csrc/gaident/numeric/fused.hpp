@@ -5,6 +5,7 @@
 // Written out, and never the compiler's choice (the build forbids contraction), so that every instruction set gives the same bits: the
 // processor's own instruction where the source is compiled for one that has it, else the C library's function, which takes that
 // instruction where the processor has it, and is exact and slow where not.
+// That of MinGW rounds twice: there the instruction is called, and a processor without it (before 2013) has other bits.
 // Where c is what the step before has left, it takes part last: one operation from one sample to the next, not two.
 //
 // A number that has no such operation (a drive's arithmetic: numeric/c30.hpp, numeric/fixed.hpp) multiplies and adds.
@@ -28,7 +29,17 @@ namespace gaident {
 
 namespace detail {
 
-#if defined(__SSE2__) && !defined(__FMA__)
+#if defined(__MINGW32__) && defined(__x86_64__) && !defined(__FMA__)
+inline const bool processor_fuses = __builtin_cpu_supports("fma") != 0;
+[[gnu::target("fma"), gnu::noinline]] inline double instruction(double a, double b, double c) { return __builtin_fma(a, b, c); }
+[[gnu::target("fma"), gnu::noinline]] inline float instruction(float a, float b, float c) { return __builtin_fmaf(a, b, c); }
+[[gnu::always_inline]] inline double fused(double a, double b, double c) {
+    return processor_fuses ? instruction(a, b, c) : __builtin_fma(a, b, c);
+}
+[[gnu::always_inline]] inline float fused(float a, float b, float c) {
+    return processor_fuses ? instruction(a, b, c) : __builtin_fmaf(a, b, c);
+}
+#elif defined(__SSE2__) && !defined(__FMA__)
 // The C library's function without the instruction splits its operands and adds up what is lost.
 // Where denormals are flushed (FlushDenormals) some of these parts are, and from 1e-291 down its results are wrong;
 // the instruction flushes operands and result and nothing in between.
@@ -82,13 +93,16 @@ inline const bool without_instruction = library_goes_without();
 #else
 [[gnu::always_inline]] inline double fused(double a, double b, double c) { return __builtin_fma(a, b, c); }
 #endif
+#if !(defined(__MINGW32__) && defined(__x86_64__)) || defined(__FMA__)
+[[gnu::always_inline]] inline float fused(float a, float b, float c) { return __builtin_fmaf(a, b, c); }
+#endif
 
 }  // namespace detail
 
 [[gnu::always_inline]] inline double fma(double a, double b, double c) { return detail::fused(a, b, c); }
-[[gnu::always_inline]] inline float fma(float a, float b, float c) { return __builtin_fmaf(a, b, c); }
+[[gnu::always_inline]] inline float fma(float a, float b, float c) { return detail::fused(a, b, c); }
 [[gnu::always_inline]] inline double fnma(double a, double b, double c) { return detail::fused(-a, b, c); }
-[[gnu::always_inline]] inline float fnma(float a, float b, float c) { return __builtin_fmaf(-a, b, c); }
+[[gnu::always_inline]] inline float fnma(float a, float b, float c) { return detail::fused(-a, b, c); }
 
 namespace detail {
 

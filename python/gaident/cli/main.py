@@ -79,7 +79,7 @@ def _run(argv: Sequence[str] | None) -> int:
     except SystemExit as exit_:  # --help, --version, wrong options
         return int(exit_.code or 0)
     if args.quiet and not getattr(args, "json", False):
-        with open(os.devnull, "w") as nowhere, contextlib.redirect_stdout(nowhere):
+        with open(os.devnull, "w", encoding="utf-8") as nowhere, contextlib.redirect_stdout(nowhere):
             return _command(args.run)(args) or 0
     return _command(args.run)(args) or 0
 

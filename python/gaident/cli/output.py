@@ -11,6 +11,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from gaident.checks import check_installed
 from gaident.errors import SettingsError
 from gaident.files import write_whole
 
@@ -73,6 +74,8 @@ def target_of(path: str | None, logs: Sequence[str], suffixes: Sequence[str] = (
     if path is None:
         return None
     target = Path(path)
+    if suffixes:
+        check_installed(("matplotlib",), "pictures", "a picture")
     if suffixes and target.suffix.lower() not in suffixes:
         raise SettingsError(f"{path}: a picture ends in {', '.join(suffixes)}; rename it")
     if any(target.exists() and Path(log).exists() and target.samefile(log) for log in logs):

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from gaident.checks import check_installed
 from gaident.cli.options import PICTURES
 from gaident.cli.output import apart, naming, save_figure, target_of, write
 
@@ -34,6 +35,8 @@ class ResultFiles:
     @classmethod
     def of(cls, args: Namespace, sources: Sequence[str], **others: Path | None) -> ResultFiles:
         """The files that the options name; raises where one is a source, or two, `others` among them, are the same."""
+        if args.report is not None:
+            check_report()
         files = cls(
             target_of(args.out, sources),
             target_of(args.plot, sources, PICTURES),
@@ -65,6 +68,13 @@ class ResultFiles:
             doing(f"writing {self.page}")
             write_report(result, self.page, records, validation, drive, self.live)
         return [path for path in (self.result, self.picture, self.page) if path is not None]
+
+
+def check_report() -> None:
+    """Raises where a report lacks a library, before the work that it is made of."""
+    from gaident.reporting.report import NEEDED
+
+    check_installed(NEEDED, "pictures", "a report")
 
 
 def write_report(

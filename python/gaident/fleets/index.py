@@ -6,7 +6,6 @@ Both are bytes, as a name need not be UTF-8.
 
 from __future__ import annotations
 
-import fcntl
 import json
 import os
 import sqlite3
@@ -16,6 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from gaident.errors import GaidentError
+from gaident.files import lock_alone
 from gaident.fleets.task import Outcome, shown
 
 __all__ = ["Index", "opened", "result_path"]
@@ -205,7 +205,7 @@ def opened(folder: Path) -> Iterator[Index]:
     descriptor = os.open(folder / ".lock", os.O_RDWR | os.O_CREAT)
     try:
         try:
-            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            lock_alone(descriptor)
         except BlockingIOError:
             raise GaidentError(f"out is {folder}: another process writes there; wait for it, or name another folder") from None
         try:

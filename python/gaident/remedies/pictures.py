@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
-from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from gaident.axis import said, say, unit, velocity_unit
@@ -14,6 +14,10 @@ from gaident.policy.table import POLICY
 from gaident.remedies.loops import Loops, frequencies_of
 from gaident.remedies.plants import sampled_plants
 from gaident.results.retuning import Retuning
+from gaident.show.draw import new_figure
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 __all__ = ["plot_friction", "plot_retuning"]
 
@@ -27,7 +31,7 @@ def plot_friction(
     axis: str,
 ) -> Figure:
     """Torque over the velocity, a line with the scatter of its bins for each record: (name, mean, scatter)."""
-    figure = Figure(figsize=(8.0, 5.0), layout="constrained")
+    figure = new_figure(8.0, 5.0)
     ax = figure.subplots()
     for name, mean, scatter in rows:
         ax.errorbar(velocity, mean, scatter, marker=".", capsize=2.0, label=name)
@@ -40,7 +44,7 @@ def plot_friction(
 
 def plot_retuning(result: Retuning, axis: str = "rotary") -> Figure:
     """Size and phase of the broken loop, and the answer to a unit step of the velocity command."""
-    figure = Figure(figsize=(8.0, 8.0), layout="constrained")
+    figure = new_figure(8.0, 8.0)
     size, phase, answer = figure.subplots(3, 1)
     for name, controller in (("before", result.given), ("after", result.controller)):
         plants = sampled_plants([result.model.linear], result.period, controller.delay, result.velocity_age > 0.0)

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gaident.axis import checked_axis, message_of
-from gaident.checks import yes_or_no
+from gaident.checks import check_installed, yes_or_no
 from gaident.control.pi import bare_pi
 from gaident.data.record import Record
 from gaident.diagnosis.explain.evidence import velocity_curve
@@ -26,7 +26,9 @@ from gaident.show.report.views import View
 from gaident.show.units import scales_of
 from gaident.version import version
 
-__all__ = ["report", "report_page"]
+__all__ = ["NEEDED", "report", "report_page"]
+
+NEEDED = ("matplotlib", "plotly")  # libraries, of the extra "pictures"
 
 Vector = NDArray[np.float64]
 Records = Record | Sequence[Record] | None
@@ -76,7 +78,7 @@ def report(
     Raises
     ------
     GaidentError
-        Where result or records are something else.
+        Where result or records are something else, or where a library of the extra "pictures" is missing.
     SettingsError
         For another axis.
     OSError
@@ -109,8 +111,10 @@ def report_page(
     live: bool = True,
 ) -> str:
     """The text of what `report` writes."""
+    check_installed(NEEDED, "pictures", "a report")
     from plotly.offline import get_plotlyjs
 
+    plotly_js = get_plotlyjs() if live else ""
     if about is not None and not isinstance(about, Mapping):
         raise GaidentError(f"about is {about!r:.80}: give a dictionary of texts, for example {{'machine': 'press 4'}}")
     yes_or_no(live, "live", GaidentError)
@@ -122,7 +126,7 @@ def report_page(
         return replace(view, scales=scales_of(units, view.axis), about=dict(about or {}))
 
     if isinstance(result, Diagnosis | Identification):
-        return page(result, whole(view_of(result, records, validation, axis)), get_plotlyjs() if live else "")
+        return page(result, whole(view_of(result, records, validation, axis)), plotly_js)
     named = _named(result)
     given = {rec.digest: rec for rec in (*_records(records, (), "records"), *_records(validation, (), "validation"))}
     shown = []
@@ -130,7 +134,7 @@ def report_page(
         validation_digests = one.validation_digests if isinstance(one, Diagnosis) else ()
         own, kept = ([given[d] for d in digests if d in given] or None for digests in (one.digests, validation_digests))
         shown.append((name, one, whole(view_of(one, own, kept, axis))))
-    return page_of_several(shown, get_plotlyjs() if live else "")
+    return page_of_several(shown, plotly_js)
 
 
 def _named(results: object) -> dict[str, Diagnosis | Identification]:
@@ -189,6 +193,5 @@ def _records(given: Records, own: Sequence[Record], name: str) -> tuple[Record, 
 def _made_with() -> dict[str, str]:
     from importlib.metadata import version as installed
 
-    names = ("numpy", "scipy", "matplotlib", "plotly")
     python = ".".join(map(str, sys.version_info[:3]))  # no decision: printed: a version
-    return {"gaident": version(), "Python": python, **{n: installed(n) for n in names}}
+    return {"gaident": version(), "Python": python, **{n: installed(n) for n in ("numpy", "scipy", *NEEDED)}}

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
+from gaident.checks import check_installed
 from gaident.show.chart import PALETTES, Chart, Panel, Trace, Vector, bar_width, envelope
 
 if TYPE_CHECKING:
@@ -64,6 +65,7 @@ def grid_figure(charts: Sequence[Sequence[Chart]], width: float, height: float, 
 
 def new_figure(width: float, height: float) -> Figure:
     """An empty Figure of width and height [inch] that needs no display."""
+    check_installed(("matplotlib",), "pictures", "a picture")
     from matplotlib.backends.backend_agg import FigureCanvasAgg
 
     from gaident.show.picture import Picture

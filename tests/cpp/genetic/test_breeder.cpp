@@ -15,12 +15,20 @@ std::atomic<long> allocations{0};
 void* allocate(std::size_t n, std::size_t alignment) {
     ++allocations;
     const std::size_t size = (n + alignment - 1) / alignment * alignment;
+#if defined(_WIN32)
+    if (void* p = _aligned_malloc(size > 0 ? size : alignment, alignment)) return p;
+#else
     if (void* p = std::aligned_alloc(alignment, size > 0 ? size : alignment)) return p;
+#endif
     throw std::bad_alloc();
 }
 
 // Not inlined: the compiler would see a free() of what operator new returned, and warn.
+#if defined(_WIN32)
+[[gnu::noinline]] void release(void* p) { _aligned_free(p); }
+#else
 [[gnu::noinline]] void release(void* p) { std::free(p); }
+#endif
 
 }  // namespace
 

@@ -326,8 +326,10 @@ def test_the_controller_is_an_object() -> None:
 
 
 def test_importing_gaident_is_light() -> None:
-    code = "import time, numpy, sys; t = time.process_time(); import gaident; print(time.process_time() - t); "
-    code += "print([m for m in ('scipy', 'matplotlib', 'control', 'argparse') if m in sys.modules])"
+    """What is heavy is imported when it is used; that of the command line: tests/python/cli/test_cli_streams.py."""
+    heavy = ("numpy", "scipy", "matplotlib", "PIL", "plotly", "pandas", "pyarrow", "h5py", "control", "rich", "argparse")
+    code = "import time, sys; t = time.process_time(); import gaident; print(time.process_time() - t); "
+    code += f"print([m for m in {heavy} if m in sys.modules])"
 
     def seconds() -> float:
         out = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout
@@ -335,7 +337,7 @@ def test_importing_gaident_is_light() -> None:
         assert loaded == "[]", f"import gaident also imports {loaded}"
         return float(spent)
 
-    assert fastest(seconds, below=0.25) < 0.25  # of processor time
+    assert fastest(seconds, below=0.1) < 0.1  # of processor time
 
 
 def test_files_stay_readable() -> None:

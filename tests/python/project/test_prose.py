@@ -70,7 +70,7 @@ def pages() -> list[Path]:
     """The Markdown of the project."""
     return [
         *sorted((ROOT / "docs").rglob("*.md")),
-        *(ROOT / name for name in ("README.md", "CONTRIBUTING.md", "bench/README.md")),
+        *(ROOT / name for name in ("README.md", "CHANGELOG.md", "CONTRIBUTING.md", "bench/README.md")),
     ]
 
 

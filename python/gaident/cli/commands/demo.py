@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import sys
 from collections.abc import Callable
+from importlib.util import find_spec
 from pathlib import Path
 from shlex import quote
 from typing import Any
@@ -23,6 +24,7 @@ def demo_command(args: argparse.Namespace) -> None:
     folder = Path(args.out)
     folder.mkdir(parents=True, exist_ok=True)
     say: Callable[[str], None] = (lambda text: None) if args.json else print
+    drawn = find_spec("matplotlib") is not None
     truth, controller = demonstration.TRUTH, demonstration.CONTROLLER
     say(demonstration.STORY)
     with Progress(None if args.quiet else sys.stderr) as progress:
@@ -32,8 +34,9 @@ def demo_command(args: argparse.Namespace) -> None:
         say(f"\nCompared with the truth\n{mechanics_comparison(idn.mechanics, truth)}")
     log, picture = folder / "demo_two_mass.csv", folder / "demo_two_mass.png"
     write(log, csv_text(rec, None, "rotary").encode())
-    save_figure(idn.plot(rec), picture)
-    say(f"\nwritten: {picture}, {log}; the same from the log:")
+    if drawn:
+        save_figure(idn.plot(rec), picture)
+    say(f"\nwritten: {f'{picture}, ' if drawn else ''}{log}; the same from the log:")
     say(f"  {program()} identify {quote(str(log))} --kp {controller.kp} --ki {controller.ki} --loop {controller.loop}")
     report: dict[str, Any] = {
         "schema": "gaident/demo",
@@ -51,8 +54,10 @@ def demo_command(args: argparse.Namespace) -> None:
             rec, idn = demonstration.identify_emps(path, args.seed, progress, args.workers)
         say(summary_of(idn, "linear"))
         picture = folder / "demo_emps.png"
-        save_figure(idn.plot(rec, "linear"), picture)
-        say(f"\n{demonstration.EMPS_TRUTH}\nwritten: {picture}")
+        say(f"\n{demonstration.EMPS_TRUTH}")
+        if drawn:
+            save_figure(idn.plot(rec, "linear"), picture)
+            say(f"written: {picture}")
         report["emps"] = {"identification": idn.to_dict()}
     say(f"\n{'-' * 100}\n{demonstration.FRICTION_STORY}")
     with Progress(None if args.quiet else sys.stderr) as progress:
@@ -60,10 +65,13 @@ def demo_command(args: argparse.Namespace) -> None:
     say(dia.summary())
     log, picture = folder / "demo_friction.csv", folder / "demo_friction.png"
     write(log, csv_text(rec, None, "rotary").encode())
-    save_figure(dia.plot(), picture)
+    if drawn:
+        save_figure(dia.plot(), picture)
     controller = demonstration.DIGITAL
-    say(f"\n{demonstration.FRICTION_TRUTH}\nwritten: {picture}, {log}; the same from the log:")
+    say(f"\n{demonstration.FRICTION_TRUTH}\nwritten: {f'{picture}, ' if drawn else ''}{log}; the same from the log:")
     say(f"  {program()} diagnose {quote(str(log))} --kp {controller.kp} --ki {controller.ki}")
+    if not drawn:
+        say('No pictures, which need matplotlib: pip install "gaident[pictures]"')
     report["friction"] = {"truth": demonstration.HIDDEN, "diagnosis": dia.to_dict()}
     if args.json:
         print_json(report)

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from gaident.cli.drive import drive_of
 from gaident.cli.output import print_json, target_of
-from gaident.cli.result_files import write_report
+from gaident.cli.result_files import check_report, write_report
 from gaident.data.record import Record
 from gaident.drive.drive_file import Drive, axes_in
 from gaident.errors import GaidentError
@@ -25,6 +25,7 @@ def report_command(args: argparse.Namespace) -> None:
     logs, validation_logs = [path for path in args.logs if not path.endswith(".json")], args.validation or []
     target = target_of(args.out, [*named, *logs, *validation_logs])
     assert target is not None
+    check_report()
     results = {path: _loaded(path) for path in named}
     drives = _drives(args, len(results) > 1)
     records, validation = ([rec for log in listed for rec in _read(log, drives)] for listed in (logs, validation_logs))

@@ -7,6 +7,7 @@ import sys
 from pathlib import Path
 
 from gaident import paper
+from gaident.checks import check_installed
 from gaident.cli.output import print_json, write
 from gaident.show.progress_bar import Progress
 
@@ -14,6 +15,7 @@ __all__ = ["reproduce_command"]
 
 
 def reproduce_command(args: argparse.Namespace) -> None:
+    check_installed(("matplotlib",), "pictures", "a picture of the paper")
     folder = Path(args.out)
     folder.mkdir(parents=True, exist_ok=True)
     with Progress(None if args.quiet else sys.stderr) as progress:

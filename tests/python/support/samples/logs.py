@@ -6,6 +6,7 @@ import io
 import math
 import warnings
 import zipfile
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -302,7 +303,7 @@ GARBAGE: list[tuple[str, bytes, dict[str, Any], list[str]]] = [
         "new.mat",
         b"MATLAB 7.3 MAT-file, Platform: GLNXA64".ljust(512) + b"\x89HDF\r\n\x1a\n",
         {},
-        ["7.3", "'-v7'"],
+        ["7.3", "'-v7'" if find_spec("h5py") else "gaident[hdf5]"],
     ),
     ("nothing.mat", mat(label="text"), {}, ["no arrays of numbers", "'label' (text)"]),
     (
