@@ -90,8 +90,7 @@ embedded: ## the search in a drive, on two emulated Cortex-M boards, and the rec
 	@if csrc/embedded/tools.sh arm64; then $(MAKE) --no-print-directory --jobs=$(JOBS) -f csrc/embedded/arm64.mk OUT=build/embedded; \
 		else echo "ARM64 left out: its tools do not install here" >&2; fi
 
-# What a user gets who has no compiler: only the environment's own programs are on the path. Without the extra "pictures" the demo
-# runs, with it and what they need the tests in WHEEL_TESTS.
+# What a user gets who has no compiler: only the environment's own programs are on the path; the demo runs, and the tests in WHEEL_TESTS.
 WHEEL := build/wheel
 WHEEL_TESTS := $(addprefix tests/python/,models/test_simulate.py data/test_record.py data/test_read.py show/test_saved_0_1.py \
 	cli/test_no_pictures.py trust/test_files.py)
@@ -107,7 +106,7 @@ wheel: .venv/.released ## this machine's wheel, installed and tried in an empty 
 	@for name in cc c++ gcc g++ clang cmake ninja make; do ! $(WITHOUT_COMPILER) /bin/sh -c "command -v $$name" || exit 1; done
 	cd $(WHEEL)/out && $(WITHOUT_COMPILER) gaident doctor
 	cd $(WHEEL)/out && $(WITHOUT_COMPILER) gaident demo --quiet --out demo
-	$(WHEEL)/bare/bin/python -m pip install --quiet --only-binary :all: "$$(echo $(WHEEL)/repaired/*.whl)[pictures]" pytest hypothesis "mpmath==1.3.*"
+	$(WHEEL)/bare/bin/python -m pip install --quiet --only-binary :all: pytest hypothesis "mpmath==1.3.*"
 	$(WITHOUT_COMPILER) $(WHEEL)/bare/bin/python -m pytest -q -p no:cacheprovider $(WHEEL_TESTS)
 	@ls -l $(WHEEL)/repaired/*.whl
 
@@ -150,7 +149,7 @@ listed = $(BIN)/python -c 'import ast, re; print(*ast.literal_eval(re.search(r"(
 	@touch $@
 
 .venv/.installed: .venv/.tools $(SOURCES)
-	$(PIP_INSTALL) $(PACKAGE) ".[pictures]"
+	$(PIP_INSTALL) $(PACKAGE) .
 	@touch $@
 
 # What the tests need, and the package built for them, apart: the first waits for the network, the second for the compiler.
