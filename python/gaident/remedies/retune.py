@@ -14,6 +14,7 @@ from gaident.axis import Text, say
 from gaident.checks import real_number
 from gaident.control.cascade import Cascade, cascade_of
 from gaident.control.controller import Controller, checked_controller
+from gaident.control.differencing import older
 from gaident.control.filters import Filter, LowPass, Notch
 from gaident.control.pi import PI
 from gaident.errors import SettingsError
@@ -157,7 +158,8 @@ def retune(
     if isinstance(given, PI):
         found = replace(given, kp=proposal.velocity.kp, ki=proposal.velocity.ki)
     after = judge.figures(proposal)
-    told = simulated_with(result.model, given, found, period, asked.step, after)
+    now, then = older(given, age), older(found, age)
+    told = simulated_with(result.model, now, then, period, asked.step, after)
     return Retuning(
         controller=found,
         given=given,
@@ -173,7 +175,7 @@ def retune(
         rule=tuned.rule,
         starts=work.starts(),
         simulated=told,
-        mended=without_each(result.model, found, period, asked.step, after),
+        mended=without_each(result.model, then, period, asked.step, after),
         notes=(*notes, *more, *_of_the_covariance(len(drawn) - 1, holds), *_of_the_mechanism(result.model)),
         model=result.model,
         period=period,
