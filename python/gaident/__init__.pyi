@@ -4,6 +4,7 @@ from .data import Alignment, Record, Winding, align, columns, differentiate, rea
 from .diagnosis import diagnose, first_experiment
 from .errors import GaidentError
 from .estimation import ForceError, WindingFit, estimate_winding, force_error, inverse_dynamics
+from .export import to_fmu
 from .fleets import Fleet, Trends, fleet, trends
 from .identification import LeastSquares, identify, least_squares, m_sequence
 from .models import (
@@ -51,6 +52,7 @@ from .results import (
     load,
 )
 from .show import progress
+from .simulators import JointParameters, joint_parameters
 
 __all__ = [
     "PI",
@@ -69,6 +71,7 @@ __all__ = [
     "GaidentError",
     "Identification",
     "InverseDynamics",
+    "JointParameters",
     "LeastSquares",
     "Limits",
     "LoopFigures",
@@ -108,6 +111,7 @@ __all__ = [
     "identify",
     "initial_state",
     "inverse_dynamics",
+    "joint_parameters",
     "least_squares",
     "load",
     "m_sequence",
@@ -123,6 +127,7 @@ __all__ = [
     "run",
     "simulate",
     "simulate_many",
+    "to_fmu",
     "trends",
 ]
 
