@@ -14,6 +14,7 @@ import pytest
 import gaident as ga
 from gaident.axis import said
 from gaident.results.json_text import json_text
+from report_cases import diagnosed
 
 ONE = ga.OneMass(J=4e-4, D=2e-3).model()
 TWO = ga.TwoMass(JM=2e-4, DM=1e-3, JL=6e-4, DL=3e-3, KG=40.0, DG=5e-3).model()
@@ -22,11 +23,7 @@ LOOP = ga.PI(0.03, 1.0, torque_limit=2.0)
 
 @pytest.fixture(scope="module")
 def found() -> ga.Diagnosis:
-    command = np.repeat([20.0, -30.0, 5.0, -3.0, 12.0], 150)
-    noise = 0.05 * np.random.default_rng(3).standard_normal(len(command))
-    drive = ONE.with_effect("coulomb_friction", torque=0.2)
-    run = ga.run(drive, ga.Record(1e-3, command=command - noise, velocity=noise), LOOP)
-    return ga.diagnose(ga.Record(1e-3, command=command, velocity=run.velocity + noise, torque=run.torque), LOOP, seed=1)
+    return replace(diagnosed(), controller=LOOP)
 
 
 def element(text: str, path: str) -> dict[str, str]:
@@ -37,7 +34,7 @@ def element(text: str, path: str) -> dict[str, str]:
 
 def test_one_mass_with_its_controller(found: ga.Diagnosis) -> None:
     joint = ga.joint_parameters(found)
-    assert joint.inertia == pytest.approx(4e-4, rel=1e-3) and joint.friction == pytest.approx(0.2, rel=1e-2)
+    assert joint.inertia == pytest.approx(5e-4, rel=1e-2) and joint.friction == pytest.approx(0.05, rel=1e-2)
     assert (joint.kp, joint.ki, joint.position_gain, joint.torque_limit) == (0.03, 1.0, None, 2.0)
     assert joint.shaft is None and joint.motor == (joint.inertia, joint.damping, joint.friction) and not joint.left_out
     text = joint.to_mujoco("axis")

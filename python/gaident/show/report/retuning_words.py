@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from gaident.axis import said, say, unit
+from gaident.axis import said, say, unit, word
 from gaident.control.controller import Controller
 from gaident.control.filters import LowPass
 from gaident.results.retuning import Retuning
@@ -11,6 +11,7 @@ from gaident.show.wording import number
 __all__ = ["added_filters", "asked_words", "figure_rows", "gain_rows"]
 
 FIGURES = {
+    "stable": "stability",
     "phase_margin": "phase margin",
     "gain_margin": "gain margin",
     "sensitivity": "largest sensitivity",
@@ -45,8 +46,14 @@ def asked_words(result: Retuning, axis: str) -> str:
     if result.torque_limit is not None:
         step = f"{number(result.step)} {unit('rad/s', axis)}"
         asked.append(f"{number(result.torque_limit)} {unit('N m', axis)} for a step of {step}")
+    if result.torque_noise is not None:
+        asked.append(f"{number(result.torque_noise)} {unit('N m', axis)} of {word('torque', axis)} noise")
+    if result.after.position_phase_margin is not None:
+        asked.append("the same margins of the position loop")
     kept = "keeps" if result.keeps else "does not keep"
     text = f"The proposal {kept} what was asked for: {', '.join(asked)}."
+    if result.missed:
+        text += f" Missed: {', '.join(said(say(FIGURES[name]), axis) for name in result.missed)}."
     if result.drives:
         share = f"{100.0 * result.holds:.0f} %"
         text += f" The margins hold in {share} of {result.drives} drives that the records leave possible."
@@ -73,6 +80,8 @@ def figure_rows(result: Retuning, axis: str) -> list[tuple[str, str, str, str, s
     """(figure, before, 95 % of the drives, after, 95 % of the drives, unit) of the loop."""
     rows = []
     for name, words in FIGURES.items():
+        if name == "stable":
+            continue
         before, after = getattr(result.before, name), getattr(result.after, name)
         if after is not None and before is not None:
             (old, old_spread), (new, new_spread) = (
