@@ -10,7 +10,7 @@ from __future__ import annotations
 from xml.etree import ElementTree
 from xml.etree.ElementTree import Element, SubElement
 
-from gaident.axis import said, say, unit
+from gaident.axis import Text, said, say, unit
 from gaident.errors import SettingsError
 from gaident.simulators.numbers import JointNumbers
 
@@ -25,8 +25,6 @@ def mujoco(joint: JointNumbers, name: str) -> str:
     _checked(name)
     root = Element("mujoco", model=name)
     _said(root, joint)
-    if joint.lag:
-        SubElement(root, "option", integrator="implicitfast")
     world = SubElement(root, "worldbody")
     if joint.shaft is None:
         _body(world, joint, name, joint.motor)
@@ -95,7 +93,7 @@ def urdf(joint: JointNumbers, name: str) -> str:
     """See `JointParameters.to_urdf`."""
     _checked(name)
     root = Element("joint", name=name, type="continuous" if joint.axis == "rotary" else "prismatic")
-    _said(root, joint)
+    _said(root, joint, *_lag(joint), *_rigid(joint))
     of = unit("kg m^2", joint.axis)
     where = (
         f" <inertial> of the link behind it: {joint.inertia:.9g} {of} along the axis, the motor's {joint.motor[0]:.9g} included "
@@ -115,7 +113,7 @@ def sdf(joint: JointNumbers, name: str) -> str:
     """See `JointParameters.to_sdf`."""
     _checked(name)
     root = Element("model", name=name)
-    _said(root, joint)
+    _said(root, joint, *_lag(joint))
     kind = "revolute" if joint.axis == "rotary" else "prismatic"
     of = unit("kg m^2", joint.axis)
     links = [("motor", joint.motor[0]), ("load", joint.at_load[0])] if joint.shaft else [(name, joint.inertia)]
@@ -160,14 +158,24 @@ def _sdf_joint(
         SubElement(SubElement(axis, "limit"), "effort").text = _n(limit)
 
 
-def _said(root: Element, joint: JointNumbers) -> None:
-    """Doubts first, then what the joint has not, as comments."""
+def _lag(joint: JointNumbers) -> list[Text]:
+    return [say("Lag of the actuator, in no joint: {:.6g} s.", joint.lag)] if joint.lag else []
+
+
+def _rigid(joint: JointNumbers) -> list[Text]:
+    if joint.shaft is None:
+        return []
+    return [say("Shaft between motor and load, here rigid: {:.6g} {N m/rad}, {:.3g} {N m s/rad}.", *joint.shaft)]
+
+
+def _said(root: Element, joint: JointNumbers, *more: Text) -> None:
+    """Doubts first, then what the joint has not, as comments; more: what this form has not beside it."""
     texts = [f"Warning: {said(doubt, joint.axis)}" for doubt in joint.doubts]
     texts += [said(text, joint.axis) for text in joint.left_out]
     if joint.load:
         constant = say("Constant load, in no joint: {:.6g} {N m} against a motion forwards.", joint.load)
         texts.append(said(constant, joint.axis))
-    for text in texts:
+    for text in (*texts, *(said(one, joint.axis) for one in more)):
         root.append(ElementTree.Comment(f" {text.replace('--', '- -')} "))
 
 

@@ -66,6 +66,10 @@ def test_two_masses_are_two_joints_and_a_shaft() -> None:
     assert [j.attrib["name"] for j in sdf.findall("joint")] == ["axis", "axis_shaft"]
     assert sdf.findtext("joint[2]/axis/dynamics/spring_stiffness") == "40" and sdf.findtext("joint[2]/child") == "load"
     assert "damping 0.003, friction 0.1" in joint.to_sdf()
+    assert (
+        "here rigid: 40 N m/rad, 0.005 N m s/rad" in joint.to_urdf()
+        and element(joint.to_urdf(), "dynamics")["friction"] == "0.15"
+    )
     blocks = {(block, name): (value, unit) for block, name, value, unit in joint.to_simscape()}
     assert blocks["Motor Inertia", "Inertia"] == (pytest.approx(2e-4), "kg m^2")
     assert blocks["Load Rotational Friction", "Coulomb friction torque"] == (pytest.approx(0.1), "N m")
@@ -115,6 +119,7 @@ def test_what_is_no_straight_line_and_what_a_joint_has_not() -> None:
     assert blocks["Breakaway friction velocity"] == pytest.approx(2.0 / math.sqrt(2.0))
     text = joint.to_mujoco()
     assert element(text, "actuator/general")["dynprm"] == "0.001" and "Constant load, in no joint: 0.3 N m" in text
+    assert all("Lag of the actuator, in no joint: 0.001 s" in form for form in (joint.to_urdf(), joint.to_sdf()))
     uneven = ONE.with_effect(
         "asymmetric_friction", torque_positive=0.1, torque_negative=0.3, viscous_positive=0.0, viscous_negative=0.0
     )
