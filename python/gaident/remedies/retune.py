@@ -17,7 +17,9 @@ from gaident.control.controller import Controller, checked_controller
 from gaident.control.differencing import older
 from gaident.control.filters import Filter, LowPass, Notch
 from gaident.control.pi import PI
+from gaident.data.signals.difference import is_difference_of_lines
 from gaident.errors import SettingsError
+from gaident.models.drive_torque import HALF
 from gaident.models.effects_linear import LATE
 from gaident.models.model import Model
 from gaident.policy.table import POLICY
@@ -35,7 +37,7 @@ from gaident.results.identification import Identification
 from gaident.results.retuning import Retuning, RuleStart
 from gaident.version import version
 
-__all__ = ["retune"]
+__all__ = ["age_of", "retune"]
 
 AS_GIVEN = "the given gains"
 NO_FILTER = "A PI has no filter: where the drive can have one, give a Cascade around the PI as controller."
@@ -128,7 +130,7 @@ def retune(
         raise SettingsError(f"filters is {filters!r}: give True or False")
     if isinstance(seed, bool) or not isinstance(seed, int) or seed < 0:
         raise SettingsError(f"seed is {seed!r}: give a whole number >= 0")
-    age = result.velocity_age if isinstance(result, Diagnosis) else 0.0
+    age = age_of(result, given)
     axis = result.axis if isinstance(result, Diagnosis) else "rotary"
     drawn = drawn_models(result, POLICY.checked_drives, seed)
     linear = [_with_what_is_late(model) for model in drawn]
@@ -376,6 +378,15 @@ def _asked(
         numbers.get("torque_noise"),
         _noise_of(result),
     )
+
+
+def age_of(result: Identification | Diagnosis, given: Controller) -> float:
+    """Lines of the log by which the velocity is old: as diagnosed, else half a sample where it is the positions' difference."""
+    if isinstance(result, Diagnosis):
+        return result.velocity_age
+    pairs = [(r, r.position) for r in result.records]
+    made = pairs and all(q is not None and is_difference_of_lines(r.velocity, q, r.dt) for r, q in pairs)
+    return HALF / given.log_every(result.records[0].dt) if made else 0.0
 
 
 def _step_of(result: Identification | Diagnosis) -> float:

@@ -17,6 +17,7 @@ from gaident.remedies.draws import drawn_models
 from gaident.remedies.loops import Loops, frequencies_of
 from gaident.remedies.nonlinear import simulated_with, without_each
 from gaident.remedies.plants import sampled_plants
+from gaident.remedies.retune import age_of
 from gaident.results.json_text import json_text
 from gaident.results.store import schema
 
@@ -125,6 +126,10 @@ def test_a_falsified_model_is_said_so_first(found: ga.Diagnosis) -> None:
     hidden = LAGGED.with_effect("coulomb_friction", torque=0.3)
     idn = ga.identify(log_of(hidden, GIVEN), controller=GIVEN)
     assert idn.falsified
+    assert age_of(idn, GIVEN) == 0.0 and age_of(replace(found, velocity_age=0.5), GIVEN) == 0.5
+    made = tuple(r.with_channels(position=T * np.cumsum(r.velocity)) for r in idn.records)
+    assert age_of(replace(idn, records=made), GIVEN) == 0.5
+    assert age_of(replace(idn, records=made), ga.Cascade(GIVEN, period=T / 4)) == 0.125
     result = ga.retune(idn, filters=False)
     assert result.summary().startswith("Warning: The data contradict this model: the linear model is falsified.")
     assert "in doubt" in repr(result)
