@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Sequence
+
 from gaident.axis import Text, say
 from gaident.models.model import Model
 from gaident.results.diagnosis import Diagnosis
@@ -41,8 +44,9 @@ def doubts_of(result: Identification | Diagnosis) -> tuple[Text, ...]:
     return tuple(found)
 
 
-def no_gains(model: Model) -> Text:
-    """Why no gains were found with which the velocity loop is stable."""
-    fastest = max(map(abs, model.mechanism.poles), default=1.0)
-    sprung = any(abs(zero) <= AT_ZERO * fastest for zero in model.mechanism.zeros)
+def no_gains(models: Sequence[Model]) -> Text:
+    """Why no gains were found with which the velocity loop is stable around all of these drives, the identified one first."""
+    fastest = max(map(abs, models[0].mechanism.poles), default=1.0)
+    slow = [min((z.real for z in m.mechanism.zeros if z.imag == 0.0), key=abs, default=math.inf) for m in models]
+    sprung = abs(slow[0]) <= AT_ZERO * fastest or (min(slow) < 0.0 < max(slow) < math.inf)
     return say(NO_GAINS, say(SPRUNG if sprung else STAY))

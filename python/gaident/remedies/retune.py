@@ -150,7 +150,7 @@ def retune(
     tuned, notes = work.best(allowed)
     tuned = work.held(tuned, judge)
     if tuned.excess >= UNSTABLE:
-        tuned, notes = replace(tuned, cascade=cascade_of(given), rule=AS_GIVEN), [no_gains(linear[0])]
+        tuned, notes = replace(tuned, cascade=cascade_of(given), rule=AS_GIVEN), [no_gains(linear)]
     proposal, more = work.placed(tuned.cascade)
     phase, gain = judge.margins(proposal)
     holds = float(np.mean((phase >= asked.phase_margin) & (gain >= asked.gain_margin)))

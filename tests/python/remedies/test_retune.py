@@ -12,7 +12,7 @@ import pytest
 
 import gaident as ga
 from gaident.axis import said
-from gaident.remedies.doubts import doubts_of
+from gaident.remedies.doubts import doubts_of, no_gains
 from gaident.remedies.draws import drawn_models
 from gaident.remedies.loops import Loops, frequencies_of
 from gaident.remedies.nonlinear import simulated_with, without_each
@@ -120,6 +120,15 @@ def test_where_no_gains_are_stable_the_given_ones_stay(found: ga.Diagnosis) -> N
     assert "The given ones stay" in result.notes[0] and "zero at 0, as of an axis on a spring" in result.notes[0]
     assert "NOT STABLE" in result.summary() and "Missed: stability" in " ".join(result.summary().split())
     assert "force that grows with the position" in said(result.notes[0], "linear")
+
+
+def test_a_zero_that_may_be_at_0_is_one_of_a_spring() -> None:
+    def axis(zero: float) -> ga.Model:
+        return ga.Model(2500.0, [-5.0 + 60.0j, -5.0 - 60.0j], [zero])
+
+    assert "on a spring" in no_gains([axis(-3e-4), axis(2e-4), axis(-1e-3)]) and "on a spring" in no_gains([axis(0.0)])
+    for others in ([axis(-3.0), axis(-2.0)], [ga.Model(2500.0, [-5.0])], [LAGGED.mechanism]):
+        assert no_gains(others).endswith("in the velocity loop: the given ones stay.")
 
 
 def test_a_falsified_model_is_said_so_first(found: ga.Diagnosis) -> None:
