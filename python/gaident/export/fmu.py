@@ -134,9 +134,7 @@ def to_fmu(
     packed = io.BytesIO()
     with zipfile.ZipFile(packed, "w", zipfile.ZIP_DEFLATED) as archive:
         for file, data in sorted(contents.items(), key=lambda item: (item[0] != "modelDescription.xml", item[0])):
-            entry = zipfile.ZipInfo(file, DATE)
-            entry.compress_type = zipfile.ZIP_DEFLATED
-            archive.writestr(entry, data)
+            archive.writestr(zipfile.ZipInfo(file, DATE), data, zipfile.ZIP_DEFLATED)
     write_whole(target, packed.getvalue())
     return target
 

@@ -144,18 +144,24 @@ def _sdf_joint(
     limit: float | None = None,
 ) -> None:
     made = SubElement(root, "joint", name=name, type=kind)
-    SubElement(made, "parent").text = parent
-    SubElement(made, "child").text = child
+    made.extend([_element("parent", parent), _element("child", child)])
     axis = SubElement(made, "axis")
-    SubElement(axis, "xyz").text = "0 0 1"
+    axis.append(_element("xyz", "0 0 1"))
     dynamics = SubElement(axis, "dynamics")
-    SubElement(dynamics, "damping").text = _n(damping)
-    SubElement(dynamics, "friction").text = _n(friction)
+    dynamics.extend([_element("damping", _n(damping)), _element("friction", _n(friction))])
     if stiffness is not None:
-        SubElement(dynamics, "spring_stiffness").text = _n(stiffness)
-        SubElement(dynamics, "spring_reference").text = "0"
+        dynamics.extend([_element("spring_stiffness", _n(stiffness)), _element("spring_reference", "0")])
     if limit is not None:
-        SubElement(SubElement(axis, "limit"), "effort").text = _n(limit)
+        SubElement(axis, "limit").append(_element("effort", _n(limit)))
+
+
+def _element(name: str, text: str) -> Element:
+    """An element with a text."""
+    builder = ElementTree.TreeBuilder()
+    builder.start(name, {})
+    builder.data(text)
+    builder.end(name)
+    return builder.close()
 
 
 def _lag(joint: JointNumbers) -> list[Text]:
