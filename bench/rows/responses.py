@@ -9,7 +9,7 @@ import numpy as np
 from rows.case import Case, Result, digest
 
 import gaident as ga
-from gaident.identification.frequency import measured_response, sampled_response
+from gaident.identification.response.averaged import measured_response, sampled_response
 
 __all__ = ["responses", "shown_points"]
 

@@ -7,18 +7,22 @@ using namespace gaident;
 
 namespace {
 
-// The records of an identification, with the arrays they borrow.
+// The records and responses of an identification, with the arrays they borrow.
 struct PyExperiment {
     std::vector<PyRecord> arrays;
+    std::vector<std::shared_ptr<const Response>> responses;
     Experiment experiment;
     std::atomic<bool> stop{false};
 
-    PyExperiment(std::vector<PyRecord> records, const Loop& loop, const std::string& kernels) : arrays(std::move(records)) {
+    PyExperiment(std::vector<PyRecord> records, const Loop& loop, const std::string& kernels,
+                 std::vector<std::shared_ptr<const Response>> measured)
+        : arrays(std::move(records)), responses(std::move(measured)) {
         for (PyRecord& r : arrays) {
             r.close(loop);
             experiment.records.push_back(r.record);
         }
         experiment.loop = loop;
+        for (const auto& r : responses) experiment.responses.push_back(r.get());
         if (!kernels.empty()) {
             experiment.kernels = kernels_named(kernels.c_str());
             if (experiment.kernels == nullptr)
@@ -134,6 +138,14 @@ py::tuple sensitivities(PyExperiment& e, double gain, const ComplexArray& poles,
     return py::make_tuple(to_array(error), J, to_array(factors));
 }
 
+ComplexArray plant_at(const Response& r, double gain, const ComplexArray& poles, const ComplexArray& zeros) {
+    std::vector<double> real(r.size()), imaginary(r.size());
+    r.plant(make_factors(gain, poles, zeros), 0, real, imaginary);
+    ComplexArray found(static_cast<py::ssize_t>(r.size()));
+    for (std::size_t k = 0; k < r.size(); ++k) found.mutable_data()[k] = {real[k], imaginary[k]};
+    return found;
+}
+
 std::tuple<double, ComplexArray, ComplexArray> decode_bits(const std::vector<Word>& words, const SearchRanges& ranges, bool gray,
                                                            bool logarithmic) {
     const Genome genome(ranges, gray ? Code::gray : Code::binary, logarithmic ? Scale::logarithmic : Scale::linear);
@@ -188,6 +200,19 @@ void bind_identify(py::module_& m) {
              py::arg("elites"), py::arg("gray"), py::arg("logarithmic"), py::arg("error_weight"), py::arg("order_weight"),
              py::arg("species"), py::arg("round"), py::arg("quiet_rounds"), py::arg("in_float"), py::arg("mirror") = "");
 
+    py::class_<Response, std::shared_ptr<Response>>(m, "Response")
+        .def(py::init([](const ComplexArray& at, const ComplexArray& value, const RealArray& weight, double sample_time,
+                         std::pair<double, double> band, double noise) {
+                 const auto all = [](const ComplexArray& a) {
+                     return std::span<const std::complex<double>>(a.data(), static_cast<std::size_t>(a.size()));
+                 };
+                 return std::make_shared<Response>(all(at), all(value), view(weight), sample_time, band.first, band.second,
+                                                   noise);
+             }),
+             py::kw_only(), py::arg("at"), py::arg("value"), py::arg("weight"), py::arg("sample_time"), py::arg("band"),
+             py::arg("noise"))
+        .def("plant", &plant_at, py::arg("gain"), py::arg("poles"), py::arg("zeros"));
+
     py::class_<PyRefined>(m, "Refined")
         .def_property_readonly("gain", [](const PyRefined& f) { return f.r.factors.gain; })
         .def_property_readonly("poles", [](const PyRefined& f) { return poles_of(f.r.factors); })
@@ -214,8 +239,9 @@ void bind_identify(py::module_& m) {
         });
 
     py::class_<PyExperiment>(m, "Experiment")
-        .def(py::init<std::vector<PyRecord>, const Loop&, const std::string&>(), py::arg("records"), py::arg("loop"),
-             py::arg("kernels") = "")
+        .def(py::init<std::vector<PyRecord>, const Loop&, const std::string&, std::vector<std::shared_ptr<const Response>>>(),
+             py::arg("records"), py::arg("loop"), py::arg("kernels") = "",
+             py::arg("responses") = std::vector<std::shared_ptr<const Response>>{})
         .def_property_readonly("kernels", [](const PyExperiment& e) { return e.experiment.kernels->name; })
         .def_property_readonly("fused", [](const PyExperiment& e) { return e.experiment.kernels->fused; })
         .def("search", &search_records, py::arg("ranges"), py::arg("settings"), py::arg("trials"), py::arg("seed"),

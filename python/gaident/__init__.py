@@ -51,6 +51,8 @@ provide(
         "plot_retuning": "gaident.remedies.pictures:plot_retuning",
         # both
         "plot_bode": "gaident.reporting.figures:plot_bode",
+        # FrequencyResponse, and an Identification of some
+        "plot_frequency_response": "gaident.reporting.figures:plot_frequency_response",
     }
 )
 

@@ -1,12 +1,25 @@
 from . import errors
 from .control import PI, Cascade, LowPass, Notch, P
-from .data import Alignment, Record, Winding, align, columns, differentiate, read, read_axes, read_columns, read_pieces
+from .data import (
+    Alignment,
+    FrequencyResponse,
+    Record,
+    Winding,
+    align,
+    columns,
+    differentiate,
+    read,
+    read_axes,
+    read_columns,
+    read_pieces,
+    read_response,
+)
 from .diagnosis import diagnose, first_experiment
 from .errors import GaidentError
 from .estimation import ForceError, WindingFit, estimate_winding, force_error, inverse_dynamics
 from .export import to_fmu
 from .fleets import Fleet, Trends, fleet, trends
-from .identification import LeastSquares, identify, least_squares, m_sequence
+from .identification import LeastSquares, frequency_response, identify, least_squares, m_sequence
 from .models import (
     Discrete,
     Effect,
@@ -67,6 +80,7 @@ __all__ = [
     "Finding",
     "Fleet",
     "ForceError",
+    "FrequencyResponse",
     "FrictionMap",
     "GaidentError",
     "Identification",
@@ -107,6 +121,7 @@ __all__ = [
     "first_experiment",
     "fleet",
     "force_error",
+    "frequency_response",
     "friction_map",
     "identify",
     "initial_state",
@@ -122,6 +137,7 @@ __all__ = [
     "read_axes",
     "read_columns",
     "read_pieces",
+    "read_response",
     "report",
     "retune",
     "run",

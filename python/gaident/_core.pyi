@@ -6,6 +6,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+_Real = NDArray[np.float64]
+_Complex = NDArray[np.complex128]
+
 class SearchRanges:
     """Where gain, roots and structural numbers are looked for: pairs (lowest, highest); roots in rad/s."""
 
@@ -174,15 +177,27 @@ MOST_STATES: int  # of plant and controller in one difference equation
 def servo_order(*, loop: Loop, clock: Clock) -> int:
     """States that a servo adds to those of the plant; ValueError where plant and servo make no linear equation."""
 
+class Response:
+    """A measured response (n,), its error sum that of (weight |value - plant|)^2; noise: of a perfect plant, 0: unknown.
+
+    at: j omega [rad/s], behind a hold over sample_time T [s] e^(j omega T) - 1; band: lowest and highest omega [rad/s].
+    """
+
+    def __init__(
+        self, *, at: _Complex, value: _Complex, weight: _Real, sample_time: float, band: tuple[float, float], noise: float
+    ) -> None: ...
+    def plant(self, gain: float, poles: NDArray[np.complex128], zeros: NDArray[np.complex128]) -> NDArray[np.complex128]:
+        """What a model shows at these frequencies."""
+
 class Experiment:
-    """Records and their loop: what candidates are simulated against.
+    """Records and their loop, and frequency responses: what candidates are simulated against.
 
     kernels: an instruction set, "" for the machine's best; fused: whether it has an instruction for a b + c.
     Ctrl-C ends long work, and so does an exception that `progress` raises.
     It gets (generations done, best fitness, number of species, (p, q) of the one that leads or (-1, -1)).
     """
 
-    def __init__(self, records: Sequence[Record], loop: Loop, kernels: str = "") -> None: ...
+    def __init__(self, records: Sequence[Record], loop: Loop, kernels: str = "", responses: Sequence[Response] = []) -> None: ...
     @property
     def kernels(self) -> str: ...
     @property
@@ -376,13 +391,7 @@ def clamped_sum(steps: NDArray[np.float64], limit: float, start: float) -> NDArr
 def rate_limited(command: NDArray[np.float64], step: float, start: float) -> NDArray[np.float64]:
     """The command followed by at most `step` a sample, from `start`."""
 
-def recurrence(
-    model: EffectModel,
-    clock: Clock,
-    loop: Loop,
-    substeps: int,
-    top_speed: float,
-) -> dict[str, Any]:
+def recurrence(model: EffectModel, clock: Clock, loop: Loop, substeps: int, top_speed: float) -> dict[str, Any]:
     """The numbers of the recurrence that simulates a model, for writing it in another language.
 
     "substeps" 0 where no effect acts, "a" and "b" then in delta = z - 1 at dt; else "effects", "a" and "b" (or "phi", "motor",

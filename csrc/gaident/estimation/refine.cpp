@@ -46,22 +46,23 @@ private:
 };
 
 Normal Descent::normal(const Vector& x) {
-    const std::size_t P = x.size(), last = experiment_.records.size() - 1;
+    const std::size_t P = x.size();
     Normal m{0.0, Vector(P, 0.0), Vector(P * P, 0.0)};
     const auto block = [&](std::size_t g, std::size_t h) { return blocks_.data() + (g * (g + 1) / 2 + h) * W * W; };
     sweep_.linearise(x, unknowns_, options_.whitening.size(), [&](const Chunk& c) {
         const std::size_t groups = c.groups();
+        const bool filtered = !options_.whitening.empty() && !c.response;
         if (c.first == 0) blocks_.assign(groups * (groups + 1) / 2 * W * W, 0.0);
-        if (!options_.whitening.empty()) white_.resize(groups * chunk_samples * W);
+        if (filtered) white_.resize(groups * chunk_samples * W);
         const auto rows = [&](std::size_t g) -> const double* {
-            return options_.whitening.empty() ? c.rows(g) : white_.data() + g * chunk_samples * W;
+            return filtered ? white_.data() + g * chunk_samples * W : c.rows(g);
         };
         for (std::size_t g = 0; g < groups; ++g) {
-            if (!options_.whitening.empty())
+            if (filtered)
                 Sweep::whiten(experiment_, options_.whitening, c.first, c.n, c.rows(g), white_.data() + g * chunk_samples * W);
             for (std::size_t h = 0; h <= g; ++h) experiment_.kernels->gram(rows(g), rows(h), c.n, block(g, h));
         }
-        if (c.first + c.n < experiment_.records[c.record].size()) return;
+        if (!c.is_last()) return;
         // The record is through: its sums go where its unknowns stand.
         m.cost += block(0, 0)[0];
         for (std::size_t i = 0; i < c.unknowns.size(); ++i) {
@@ -72,10 +73,9 @@ Normal Descent::normal(const Vector& x) {
                 m.curvature[c.unknowns[i] * P + c.unknowns[j]] += block(g, h)[li * W + lj];
             }
         }
-        if (c.record < last) return;
-        for (std::size_t j = 0; j < P; ++j)
-            for (std::size_t i = 0; i < j; ++i) m.curvature[i * P + j] = m.curvature[j * P + i];
     });
+    for (std::size_t j = 0; j < P; ++j)
+        for (std::size_t i = 0; i < j; ++i) m.curvature[i * P + j] = m.curvature[j * P + i];
     return m;
 }
 
@@ -222,7 +222,8 @@ void Refiner::sensitivities(const Factors<double>& g, const std::vector<double>&
     Vector white(chunk_samples * W);
     Sweep(experiment_).linearise(x, unknowns, options_.whitening.size(), [&](const Chunk& c) {
         for (std::size_t group = 0; group < c.groups(); ++group) {
-            Sweep::whiten(experiment_, options_.whitening, c.first, c.n, c.rows(group), white.data());
+            if (c.response) std::copy_n(c.rows(group), c.n * W, white.begin());
+            else Sweep::whiten(experiment_, options_.whitening, c.first, c.n, c.rows(group), white.data());
             for (std::size_t k = 0; k < c.n; ++k) error[at + k] = white[k * W];
             const std::size_t from = group * Chunk::per_group;
             for (std::size_t i = from; i < std::min(from + Chunk::per_group, c.unknowns.size()); ++i)

@@ -158,14 +158,19 @@ FitSums fit_sums(const Experiment& experiment, const Factors<double>& g, const s
             for (auto& w : whitened) w.resize(chunk_samples * W);
             for (Rows& r : regressors) r.clear();
         }
-        regress(c);
+        if (c.response) {
+            for (Rows& r : regressors) r.clear();
+        } else {
+            regress(c);
+        }
         rows.clear();
         for (std::size_t i = 0; i < groups; ++i) rows.push_back(c.rows(i));
         plain.add(rows, c.n);
         rows.clear();
         for (std::size_t i = 0; i < groups + extra; ++i) {
             const double* const in = i < groups ? c.rows(i) : regressors[i - groups].now();
-            Sweep::whiten(experiment, phi, c.first, c.n, in, whitened[i].data());
+            if (c.response) std::copy_n(in, c.n * W, whitened[i].begin());
+            else Sweep::whiten(experiment, phi, c.first, c.n, in, whitened[i].data());
             rows.push_back(whitened[i].data());
         }
         white.add(rows, c.n);
@@ -173,20 +178,20 @@ FitSums fit_sums(const Experiment& experiment, const Factors<double>& g, const s
         if (order > 0) {
             rows.clear();
             for (std::size_t i = 0; i < groups; ++i) {
-                kernels.colour(phi.data(), order, c.rows(i), c.n, z[i].now());
+                if (c.response) std::copy_n(c.rows(i), c.n * W, z[i].now());
+                else kernels.colour(phi.data(), order, c.rows(i), c.n, z[i].now());
                 rows.push_back(z[i].now());
             }
             coloured.add(rows, c.n);
             for (Rows& r : z) r.next(c.n);
         }
-        const std::size_t length = experiment.records[c.record].size();
-        if (c.first + c.n < length) return;
-        if (order > 0) {
+        if (!c.is_last()) return;
+        if (order > 0 && !c.response) {
             // What the noise makes of J beyond the end of the record, until it has died away; a record says nothing of
             // noise with a memory longer than itself.
             const std::vector<double> silence(chunk_samples * W, 0.0);
             double before = coloured.trace(groups);
-            for (std::size_t n = 0; n < length; n += chunk_samples) {
+            for (std::size_t n = 0; n < c.size; n += chunk_samples) {
                 for (std::size_t i = 0; i < groups; ++i) {
                     kernels.colour(phi.data(), order, silence.data(), chunk_samples, z[i].now());
                     rows[i] = z[i].now();

@@ -11,6 +11,7 @@ namespace gaident {
 namespace {
 
 constexpr std::size_t W = Chunk::width;
+constexpr double two_pi = 6.283185307179586;
 
 // Makes room in front of a chunk: the last rows of the one before, or zeros before the record.
 void keep_history(std::vector<double>& rows, std::size_t history, std::size_t first) {
@@ -53,6 +54,7 @@ std::vector<double> Unknowns::steady_starts(const Experiment& experiment, const 
 Sweep::Sweep(const Experiment& experiment) : experiment_(experiment), slowest_(0.0) {
     double longest = 0.0;
     for (const Record& r : experiment.records) longest = std::max(longest, static_cast<double>(r.size()) * r.sample_time);
+    for (const Response* r : experiment.responses) longest = std::max(longest, two_pi / r->slowest());
     slowest_ = 1.0 / longest;
 }
 
@@ -80,18 +82,8 @@ void Sweep::linearise(std::span<const double> x, const Unknowns& unknowns, std::
         columns_.resize(groups);
         scale.assign(groups * W, 0.0);
         for (std::size_t g = 0; g < groups; ++g) {
-            const std::size_t used = std::min(W, own.size() - g * Chunk::per_group + 1);
-            moved_.resize(used * x.size());
             const double* points[W];
-            for (std::size_t lane = 0; lane < used; ++lane) {
-                double* const point = moved_.data() + lane * x.size();
-                std::copy(x.begin(), x.end(), point);
-                points[lane] = point;
-                if (lane == 0) continue;
-                const std::size_t i = own[g * Chunk::per_group + lane - 1];
-                point[i] += step_size(x, unknowns.structure, slowest_, i);
-                scale[g * W + lane] = 1.0 / (point[i] - x[i]);
-            }
+            const std::size_t used = moved(x, unknowns, own, g, points, scale.data() + g * W);
             load(r, {points, used}, unknowns, bank_[g]);
         }
         each_chunk(record, [&](std::size_t first, std::size_t n) {
@@ -102,9 +94,50 @@ void Sweep::linearise(std::span<const double> x, const Unknowns& unknowns, std::
                                 record.straight_from(first), n, rows);
                 experiment_.kernels->differences(scale.data() + g * W, record.output.data() + first, n, rows);
             }
-            on_chunk({r, first, n, own, columns_, history});
+            on_chunk({r, first, n, record.size(), false, own, columns_, history});
         });
     }
+    std::vector<std::size_t> own(unknowns.model);
+    std::iota(own.begin(), own.end(), std::size_t{0});
+    const std::size_t groups = (own.size() + Chunk::per_group - 1) / Chunk::per_group;
+    for (std::size_t i = 0; i < experiment_.responses.size(); ++i) {
+        const Response& response = *experiment_.responses[i];
+        std::vector<double> numbers(chunk_samples);
+        for (std::size_t first = 0; first < response.numbers(); first += chunk_samples) {
+            const std::size_t n = std::min(chunk_samples, response.numbers() - first);
+            columns_.assign(groups, std::vector<double>((history + chunk_samples) * W, 0.0));
+            scale.assign(groups * W, 0.0);
+            for (std::size_t g = 0; g < groups; ++g) {
+                const double* points[W];
+                const std::size_t used = moved(x, unknowns, own, g, points, scale.data() + g * W);
+                double* const rows = columns_[g].data() + history * W;
+                for (std::size_t lane = 0; lane < used; ++lane) {
+                    const Factors<double> model = unpack({points[lane], unknowns.model}, unknowns.structure);
+                    response.weighted(model, first / 2, {numbers.data(), n});
+                    for (std::size_t k = 0; k < n; ++k) rows[k * W + lane] = numbers[k];
+                }
+                experiment_.kernels->differences(scale.data() + g * W, response.measured().data() + first, n, rows);
+            }
+            on_chunk({experiment_.records.size() + i, first, n, response.numbers(), true, own, columns_, history});
+        }
+        experiment_.stop_if_asked();
+    }
+}
+
+std::size_t Sweep::moved(std::span<const double> x, const Unknowns& unknowns, std::span<const std::size_t> own, std::size_t group,
+                         const double** points, double* scale) {
+    const std::size_t used = std::min(W, own.size() - group * Chunk::per_group + 1);
+    moved_.resize(used * x.size());
+    for (std::size_t lane = 0; lane < used; ++lane) {
+        double* const point = moved_.data() + lane * x.size();
+        std::copy(x.begin(), x.end(), point);
+        points[lane] = point;
+        if (lane == 0) continue;
+        const std::size_t i = own[group * Chunk::per_group + lane - 1];
+        point[i] += step_size(x, unknowns.structure, slowest_, i);
+        scale[lane] = 1.0 / (point[i] - x[i]);
+    }
+    return used;
 }
 
 void Sweep::outputs(std::span<const double> x, const Unknowns& unknowns, const OnOutputs& on_outputs) {
@@ -153,6 +186,9 @@ void Sweep::errors(std::span<const double* const> points, const Unknowns& unknow
             for (std::size_t lane = 0; lane < W; ++lane) total[lane] += part[lane];
         });
     }
+    for (const Response* r : experiment_.responses)
+        for (std::size_t i = 0; i < points.size(); ++i)
+            total[i] += r->error_sum(unpack({points[i], unknowns.model}, unknowns.structure));
     for (std::size_t i = 0; i < points.size(); ++i) sums[i] = sane(total[i]);
 }
 

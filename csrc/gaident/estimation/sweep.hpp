@@ -1,4 +1,5 @@
-// Points of one structure run over the records, chunk by chunk: what a local fit and the statistics of a fit are made of.
+// Points of one structure run over the records, chunk by chunk, and then over the responses: what a local fit and the statistics of a
+// fit are made of.
 //
 //     e(n) = w(n) - wm(n; x),     de/dx_i by forward differences, one point per lane
 //
@@ -28,16 +29,19 @@ struct Unknowns {
     std::vector<double> steady_starts(const Experiment& experiment, const Factors<double>& g) const;
 };
 
-// Error and derivatives over one chunk of one record.
+// Error and derivatives over one chunk of one record, or of one response: its weighted numbers, which are numbered behind the records.
 struct Chunk {
     static constexpr std::size_t width = double_lanes, per_group = width - 1;
 
     std::size_t record, first, n;
+    std::size_t size;                              // of the whole record
+    bool response;                                 // its errors are independent of each other
     std::span<const std::size_t> unknowns;         // of this record
     std::span<const std::vector<double>> columns;  // per group of lanes; see rows()
     std::size_t history;
 
     std::size_t groups() const { return columns.size(); }
+    bool is_last() const { return first + n == size; }
     // [sample][lane]: lane 0 is e in every group, lane l > 0 of group g is de/dx of unknowns[7 g + l - 1], what is left means
     // nothing.
     // `history` rows of earlier samples stand in front, zeros before the record.
@@ -51,12 +55,12 @@ public:
     using OnChunk = std::function<void(const Chunk&)>;
     void linearise(std::span<const double> x, const Unknowns& unknowns, std::size_t history, const OnChunk& on_chunk);
 
-    // The outputs at one point.
+    // The outputs at one point, of the records.
     using OnOutputs = std::function<void(std::size_t record, std::size_t first, std::span<const double> y)>;
     void outputs(std::span<const double> x, const Unknowns& unknowns, const OnOutputs& on_outputs);
 
     // sums[i] = sum of squares of e at points[i], or of e filtered by 1 - sum phi_i z^-i where phi is not empty.
-    // At most double_lanes points.
+    // Responses are not filtered. At most double_lanes points.
     void errors(std::span<const double* const> points, const Unknowns& unknowns, std::span<const double> phi, double* sums);
 
     // e filtered: rows that lack part of their past are zero.
@@ -72,6 +76,9 @@ private:
             experiment_.stop_if_asked();
         }
     }
+    // The models of the points, and what scales their derivatives: x moved in unknowns 7 g, 7 g + 1, ... of a group.
+    std::size_t moved(std::span<const double> x, const Unknowns& unknowns, std::span<const std::size_t> own, std::size_t group,
+                      const double** points, double* scale);
     void load(std::size_t record, std::span<const double* const> points, const Unknowns& unknowns, DoubleGroup& group) const;
 
     const Experiment& experiment_;

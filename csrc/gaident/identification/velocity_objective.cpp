@@ -102,6 +102,11 @@ VelocityObjective::VelocityObjective(const Experiment& experiment, const SearchR
         fastest_ = std::max(fastest_, 3.0 / r.sample_time);
         noise_ += noise_power(r.output) * static_cast<double>(r.size());
     }
+    for (const Response* r : experiment.responses) {
+        slowest_ = std::min(slowest_, 0.08 * r->slowest());  // as of a record that is as long as its slowest period
+        fastest_ = std::max(fastest_, r->fastest());
+        noise_ += r->noise();
+    }
 }
 
 std::unique_ptr<Evaluator> VelocityObjective::evaluator(std::size_t capacity) const {

@@ -1,5 +1,5 @@
 // The velocity loop as the objective of a search: how well a plant, simulated in its loop, gives the measured velocity of the
-// records.
+// records, and the measured frequency responses.
 //
 //     cost = fitness (equation 6) for the genetic search, the sum of squared errors for the local fit
 //
@@ -58,7 +58,7 @@ private:
     std::vector<Species> species_;
     Refiner refiner_;
     double slowest_ = 1e300, fastest_ = 0.0;  // [rad/s] where a module can still be seen
-    double noise_ = 0.0;                      // [rad^2/s^2] error sum that the noise of the measured velocity alone makes
+    double noise_ = 0.0;                      // [rad^2/s^2] error sum that the noise of what was measured alone makes
 };
 
 }  // namespace gaident

@@ -10,7 +10,7 @@
 namespace gaident {
 
 void Experiment::check() const {
-    if (records.empty()) throw std::invalid_argument("records: at least one is needed");
+    if (records.empty() && responses.empty()) throw std::invalid_argument("records: at least one is needed");
     for (const Record& r : records) {
         if (r.size() == 0 || r.input.size() != r.output.size())
             throw std::invalid_argument("records: input and output must have the same length, at least 1");
@@ -27,6 +27,7 @@ void Experiment::check() const {
 std::size_t Experiment::samples() const {
     std::size_t n = 0;
     for (const Record& r : records) n += r.size();
+    for (const Response* r : responses) n += r->numbers();
     return n;
 }
 
@@ -369,6 +370,8 @@ void Batch::errors(const Candidates& candidates, std::span<double> sums) {
     }
     std::fill(sums.begin(), sums.begin() + static_cast<std::ptrdiff_t>(count), 0.0);
     for (std::size_t r = 0; r < experiment_.records.size(); ++r) run(r, candidates, sums.data());
+    for (const Response* r : experiment_.responses)
+        for (std::size_t i = 0; i < count; ++i) sums[i] += r->error_sum(candidates.factors(i));
     for (std::size_t i = 0; i < count; ++i) sums[i] = sane(sums[i]);
 }
 

@@ -1,4 +1,4 @@
-// The centre of the core: simulate many candidates against the records.
+// The centre of the core: simulate many candidates against the records, and hold them against measured frequency responses.
 #pragma once
 
 #include "../plant/held.hpp"
@@ -7,6 +7,7 @@
 #include "../control/loop.hpp"
 #include "../runtime/stop.hpp"
 #include "record.hpp"
+#include "response.hpp"
 
 #include <functional>
 #include <vector>
@@ -18,12 +19,13 @@ class Workers;
 struct Experiment {
     std::vector<Record> records;
     Loop loop;
+    std::vector<const Response*> responses = {};  // borrowed
     const Kernels* kernels = &best_kernels();
     const std::atomic<bool>* stop = nullptr;
     Workers* workers = nullptr;  // threads that share the work on long records; null: none
 
     void check() const;  // throws std::invalid_argument, naming what is wrong
-    std::size_t samples() const;
+    std::size_t samples() const;  // of the records, and numbers of the responses
     // Long enough for one candidate's run over the records to be worth handing to another thread.
     bool is_long() const { return samples() >= 4096; }
     // Calls work(0) ... work(n-1), which run over the records each; the last is begun first.
@@ -75,7 +77,7 @@ class Batch {
 public:
     Batch(const Experiment& experiment, std::size_t capacity, bool in_float);
 
-    // sums[i] = sum over records and samples of (output - y_i)^2; worst_error_sum where a candidate diverges.
+    // sums[i] = sum over records and samples of (output - y_i)^2, and J of each response; worst_error_sum where a candidate diverges.
     void errors(std::span<const Factors<double>> candidates, std::span<double> sums);
     void errors(const Candidates& candidates, std::span<double> sums);
 

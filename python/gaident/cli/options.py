@@ -28,6 +28,7 @@ from gaident.cli.remedy_options import (
     add_retune_options,
 )
 from gaident.cli.report_options import REPORT_EXAMPLES, REPORT_HELP, add_report_option, add_report_options
+from gaident.cli.responses import add_response_options
 from gaident.control.words import LOOPS
 from gaident.errors import SettingsError
 from gaident.policy.table import POLICY
@@ -54,6 +55,9 @@ examples:
   open loop, velocity from a position, force from the drive's voltage:
     gaident identify DATA_EMPS.mat --columns torque=vir,position=qm,time=t --unit torque=35.15 \\
         --axis linear
+  a measured frequency response, alone or beside logs of the same axis:
+    gaident identify --response bode.csv --response-dt 125e-6
+    gaident identify run1.csv --drive drive.toml --response bode.csv
   as in the paper (Table II), in the paper's ranges:
     gaident identify step.csv --kp 0.0232 --ki 1.367 --loop continuous --paper \\
         --gain 1e3 2e4 --real 0 60 --imaginary 0 250 --trials 20
@@ -153,8 +157,9 @@ def parser_of(commands: Mapping[str, str]) -> argparse.ArgumentParser:
         return sub
 
     sub = command("identify", "LOG... ", "log -> structure, parameters, uncertainty", IDENTIFY_HELP, IDENTIFY_EXAMPLES)
-    sub.add_argument("logs", nargs="+", metavar="LOG", help="log file; several give one model for all")
+    sub.add_argument("logs", nargs="*", metavar="LOG", help="log file; several give one model for all")
     add_log_options(sub)
+    add_response_options(sub)
     _add_controller_options(sub)
     _add_space_options(sub)
     g = sub.add_argument_group("the search")

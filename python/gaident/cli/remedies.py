@@ -49,9 +49,9 @@ def in_options(error: GaidentError) -> str:
 def _option(a: Argument) -> str:
     if (a.name, a.value) in WHOLE:
         return WHOLE[a.name, a.value]
-    if a.name in ("columns", "units", "shift") and a.key:
+    if a.name in ("columns", "units", "shift", "response_columns", "response_units") and a.key:
         value = "" if a.value == "None" else a.value.strip("'")
-        return f"--{a.name} {shlex.quote(f'{a.key}={value}')}"
+        return f"--{a.name.replace('_', '-')} {shlex.quote(f'{a.key}={value}')}"
     if a.name in ("p", "q"):
         return f"--{a.name} {a.value.strip('()').replace(', ', '..')}"
     if a.name in _OTHER_NAME:

@@ -166,9 +166,15 @@ def is_one_equation(dt: float, controller: Controller, poles: int) -> bool:
     return poles + order <= _core.MOST_STATES
 
 
-def experiment(records: Sequence[_core.Record], controller: Controller | None, dt: float, kernels: str = "") -> _core.Experiment:
-    """Records and their loop, for the genetic search and the local fit; dt: sample time of the log [s]."""
-    return _core.Experiment(records, loop(controller, dt), kernels)
+def experiment(
+    records: Sequence[_core.Record],
+    controller: Controller | None,
+    dt: float,
+    kernels: str = "",
+    responses: Sequence[_core.Response] = (),
+) -> _core.Experiment:
+    """Records, their loop, and frequency responses for the genetic search and the local fit; dt: sample time of the log [s]."""
+    return _core.Experiment(records, loop(controller, dt), kernels, responses)
 
 
 def recurrence(

@@ -1,5 +1,7 @@
 from .alignment import Alignment, align
 from .axes import read_axes
+from .frequency.read_response import read_response
+from .frequency.response import FrequencyResponse
 from .listing import Listing, columns
 from .pieces import read_pieces
 from .readers import read, read_columns
@@ -9,6 +11,7 @@ from .winding import Winding
 
 __all__ = [
     "Alignment",
+    "FrequencyResponse",
     "Listing",
     "Record",
     "Winding",
@@ -19,4 +22,5 @@ __all__ = [
     "read_axes",
     "read_columns",
     "read_pieces",
+    "read_response",
 ]

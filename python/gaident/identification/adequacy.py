@@ -30,7 +30,7 @@ class Sums:
 
     products: sums of e(n) e(n+k), k = 0..; white: X'X of X = F [e | J | regressors], see `_core.Experiment.fit_sums`;
     unknowns: columns of J; lengths: samples of each record; noise: the autoregression F.
-    quiet: noise of the measured velocity by its third differences [rad/s].
+    quiet: noise of the measured velocity by its third differences [rad/s]; beside: numbers of frequency responses in `white`.
     """
 
     products: Vector
@@ -39,6 +39,7 @@ class Sums:
     lengths: Sequence[int]
     noise: Autoregression
     quiet: float
+    beside: int = 0
 
 
 def regressor_lags(lengths: Sequence[int], open_loop: bool) -> list[int]:
@@ -66,7 +67,7 @@ def assess(s: Sums) -> Adequacy:
     power = float(s.products[0]) / total
     white_p = ljung_box_of(s.products[: white_lags(s.lengths) + 1], total)
     predictable = 1.0 - s.noise.std**2 / power if power > 0.0 else 0.0
-    p = independence_p(s.white, s.unknowns, total - s.noise.order * len(s.lengths))
+    p = independence_p(s.white, s.unknowns, total + s.beside - s.noise.order * len(s.lengths))
     excess = math.sqrt(power) / s.quiet if s.quiet > 0.0 else (0.0 if power == 0.0 else math.inf)
     falsified = p < POLICY.test_level
     undecided = not falsified and white_p < POLICY.test_level and excess > POLICY.undecided_ratio

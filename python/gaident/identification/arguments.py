@@ -10,12 +10,23 @@ import numpy as np
 
 from gaident.arguments import A_CONTROLLER, COMMAND, CONTINUOUS_LOOP, NO_CONTROLLER, TORQUE, arg
 from gaident.control.controller import Controller, checked_controller
+from gaident.data.frequency.response import FrequencyResponse
 from gaident.data.record import Record
 from gaident.errors import RecordError, SettingsError, SpaceError
 from gaident.models.search_space import SearchSpace
 from gaident.results.settings import Settings
 
-__all__ = ["check_arithmetic", "check_numbers", "checked_records", "checked_space", "distinct"]
+__all__ = ["check_arithmetic", "check_numbers", "checked_records", "checked_space", "distinct", "parted"]
+
+
+def parted(rec: object) -> tuple[list[Record], list[FrequencyResponse]]:
+    """(records, frequency responses) of what identify() is given. Raises RecordError where it is something else."""
+    given = [rec] if isinstance(rec, Record | FrequencyResponse) else list(rec) if isinstance(rec, Sequence) else []
+    if not given or not all(isinstance(r, Record | FrequencyResponse) for r in given):
+        raise RecordError(
+            f"rec is {type(rec).__name__}: give a gaident.Record or FrequencyResponse, or a list of them, at least one"
+        )
+    return [r for r in given if isinstance(r, Record)], [r for r in given if isinstance(r, FrequencyResponse)]
 
 
 def checked_records(rec: Record | Sequence[Record], controller: Controller | None) -> list[Record]:

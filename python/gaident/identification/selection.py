@@ -24,7 +24,7 @@ from gaident.identification.noise import Autoregression, autoregression_of, high
 from gaident.models.model import Model
 from gaident.policy.table import POLICY
 
-__all__ = ["Candidate", "is_chain", "noise_of", "scored", "smallest_close", "smallest_mechanism", "tolerance"]
+__all__ = ["Candidate", "charged", "is_chain", "noise_of", "scored", "smallest_close", "smallest_mechanism", "tolerance"]
 
 
 @dataclass(frozen=True)
@@ -99,10 +99,11 @@ def scored(
     lengths: Sequence[int],
     ranges: _core.SearchRanges,
     workers: int,
+    beside: int = 0,
 ) -> list[Candidate]:
-    """The candidates with their BIC under a common noise model."""
+    """The candidates with their BIC under a common noise model; beside: numbers of frequency responses, which are white."""
     costs = [c.cost for c in candidates]
-    count = sum(lengths)
+    count = sum(lengths) + beside
     if noise.order > 0:
         fits = [c.fit for c in candidates]
         whitened = experiment.go_on(fits, ranges, noise.phi, POLICY.whitened_again, tolerance(count), workers)
@@ -110,9 +111,13 @@ def scored(
         count -= noise.order * len(lengths)  # the first samples of each record, whose past is missing
     found = []
     for c, cost in zip(candidates, costs, strict=True):
-        own = bic(cost / count, count, c.size + len(c.starts))
-        found.append(replace(c, bic=own + POLICY.rival_margin * cancellations(c.fit.poles.tolist(), c.fit.zeros.tolist())))
+        found.append(charged(c, bic(cost / count, count, c.size + len(c.starts))))
     return found
+
+
+def charged(c: Candidate, own: float) -> Candidate:
+    """The candidate with its BIC: its own, and what the poles and zeros cost that cancel each other."""
+    return replace(c, bic=own + POLICY.rival_margin * cancellations(c.fit.poles.tolist(), c.fit.zeros.tolist()))
 
 
 def tolerance(samples: int) -> float:

@@ -8,10 +8,11 @@ from typing import TYPE_CHECKING
 from gaident.axis import checked_axis, said
 from gaident.control.controller import Controller
 from gaident.control.pi import bare_pi
+from gaident.data.frequency.response import FrequencyResponse
 from gaident.data.record import Record
 from gaident.diagnosis.explain.evidence import velocity_curve
 from gaident.errors import GaidentError
-from gaident.identification.frequency import response_of
+from gaident.identification.response.averaged import response_of, responses_of
 from gaident.models.model import Model
 from gaident.reporting.runs import run_of
 from gaident.results.diagnosis import Diagnosis
@@ -21,7 +22,7 @@ from gaident.show.diagnosis_plots import plot_evidence
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-__all__ = ["plot_bode", "plot_diagnosis"]
+__all__ = ["plot_bode", "plot_diagnosis", "plot_frequency_response"]
 
 
 def plot_diagnosis(dia: Diagnosis, records: Sequence[Record], axis: str = "rotary") -> Figure:
@@ -61,3 +62,12 @@ def plot_bode(model: Model, controller: Controller | None, records: Sequence[Rec
     if not records:
         return plots.plot_bode(model, axis=axis, hz=hz)
     return response_plots.plot_response(response_of(max(records, key=len), model, bare_pi(controller)), hz, axis)
+
+
+def plot_frequency_response(
+    given: Sequence[FrequencyResponse], model: Model | None = None, hz: bool = True, axis: str = "rotary", delay: float = 0.0
+) -> Figure:
+    """Measured frequency responses, all in one diagram, and the model that was found from them, behind a delay [s]."""
+    checked_axis(axis)
+    name = given[0].name if len(given) == 1 else ""
+    return response_plots.plot_response(responses_of(given, model, delay), hz, axis, name)

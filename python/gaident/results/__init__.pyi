@@ -4,7 +4,7 @@ from .estimate import Estimate
 from .experiment import Limits, Proposal
 from .finding import Finding
 from .fitness import Comparison, Fitness
-from .frequency import FrequencyResponse, Responses
+from .frequency import AveragedResponse, Responses
 from .identification import Identification
 from .inverse_dynamics import InverseDynamics
 from .relevance import Relevance
@@ -19,7 +19,7 @@ __all__ = [
     "Estimate",
     "Finding",
     "Fitness",
-    "FrequencyResponse",
+    "AveragedResponse",
     "Identification",
     "InverseDynamics",
     "Limits",

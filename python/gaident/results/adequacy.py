@@ -32,6 +32,10 @@ class Adequacy:
         Whether it does.
     undecided : bool
         Whether it does not, but is coloured and more than twice the noise, so that dynamics may be missing.
+    of : {"record", "response"}
+        What the model was held against.
+        Of a frequency response the tests are over its frequencies: white_p and predictable of neighbouring ones, excess over the
+        stated deviations, independence_p that errors are as large as stated, noise_std their size in those deviations.
 
     See Also
     --------
@@ -46,10 +50,13 @@ class Adequacy:
     independence_p: float
     falsified: bool
     undecided: bool
+    of: str = "record"
 
     @property
     def sentence(self) -> str:
         """What it means, in words."""
+        if self.of == "response":
+            return self._of_response
         if self.falsified:
             return (
                 "The linear model is falsified: the residual still depends on the input or the motion "
@@ -74,3 +81,21 @@ class Adequacy:
                 "the standard deviations take the colour into account."
             )
         return "The residual is white: nothing left that this linear model could be blamed for."
+
+    @property
+    def _of_response(self) -> str:
+        if self.falsified:
+            return (
+                "The linear model is falsified: what it leaves of the frequency response goes on from frequency to frequency "
+                f"(p = {self.white_p:.1g}) and is {self.excess:.3g} times the stated deviations. "
+                "Do not trust the mechanical parameters; something is missing: another mass, a lag, a delay, or an axis that is "
+                "not linear."
+            )
+        if self.white_p < POLICY.test_level:
+            return (
+                "What the model leaves goes on from frequency to frequency, but is not larger than the stated deviations: the "
+                "measurement's neighbouring errors are alike. The linear model stands."
+            )
+        return (
+            "What the model leaves of the frequency response is noise: nothing left that this linear model could be blamed for."
+        )

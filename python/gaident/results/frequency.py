@@ -9,19 +9,20 @@ from numpy.typing import NDArray
 
 from gaident.axis import Text, say
 
-__all__ = ["FrequencyResponse", "Responses"]
+__all__ = ["AveragedResponse", "Responses"]
 
 Vector = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
 
 @dataclass(frozen=True, eq=False)
-class FrequencyResponse:
+class AveragedResponse:
     """An estimate over frequency [Hz], arrays (n,): value [rad/s/(N m)] complex, its standard deviation, coherence 0..1.
 
     std (n,): root of the mean |error|^2 of the complex value; magnitude, and phase times magnitude, deviate by std/sqrt(2) each.
     threshold (n,): the coherence that unrelated signals pass once in twenty. instrument: whether the command was used (joint
     input-output); False: torque to velocity directly (H1). windows: how many; resolution [Hz].
+    given: whether it was given as a response, without a record; then windows and threshold mean nothing.
     """
 
     frequency: Vector
@@ -32,10 +33,13 @@ class FrequencyResponse:
     instrument: bool
     windows: int
     resolution: float
+    given: bool = False
 
     @property
     def sentence(self) -> Text:
         """How it was estimated and what to doubt."""
+        if self.given:
+            return Text("The response as it was measured.")
         how = f"{self.windows} half-overlapping windows, resolution {self.resolution:.2g} Hz"
         if self.instrument:
             return Text(f"Joint input-output estimate: cross spectra with the command, free of the loop's bias by noise; {how}.")
@@ -50,7 +54,7 @@ class FrequencyResponse:
 class Responses:
     """A record's response, that of a model simulated on it, and the linear part's own over `fine` [Hz], (m,)."""
 
-    measured: FrequencyResponse
-    simulated: FrequencyResponse | None
+    measured: AveragedResponse
+    simulated: AveragedResponse | None
     fine: Vector
     model: Complex

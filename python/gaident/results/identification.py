@@ -13,6 +13,7 @@ from gaident.axis import linear_sentences, restored
 from gaident.control.cascade import controller_of
 from gaident.control.controller import Controller
 from gaident.control.pi import bare_pi
+from gaident.data.frequency.response import FrequencyResponse
 from gaident.data.record import Record
 from gaident.errors import GaidentError, check_schema
 from gaident.models.drive_torque import as_differenced, as_old_as_its_velocity, without_age
@@ -90,6 +91,14 @@ class Identification(SavedResult):
         Version of gaident.
     records : tuple of Record
         The data; empty where the identification was loaded from a file.
+    frequencies : int
+        Frequencies of all responses. Of responses alone `samples` is 0 and `rmse` that of the relative error [1].
+    delay : Estimate or None
+        A delay of the path [s] that the frequency responses contain beside the axis; None: none was needed.
+    response_digests : tuple of str
+        Digests of the frequency responses, see `FrequencyResponse.digest`.
+    responses : tuple of FrequencyResponse
+        The frequency responses; empty where the identification was loaded from a file.
 
     See Also
     --------
@@ -121,6 +130,10 @@ class Identification(SavedResult):
     controller_numbers: Mapping[str, Estimate] = field(default_factory=dict, hash=False)
     covariance: tuple[tuple[float, ...], ...] | None = None
     records: tuple[Record, ...] = field(default=(), compare=False, repr=False)
+    frequencies: int = 0
+    delay: Estimate | None = None
+    response_digests: tuple[str, ...] = ()
+    responses: tuple[FrequencyResponse, ...] = field(default=(), compare=False, repr=False)
 
     def __repr__(self) -> str:
         verdict = "falsified" if self.falsified else "undecided" if self.adequacy.undecided else "stands"
@@ -140,6 +153,11 @@ class Identification(SavedResult):
     def history(self) -> tuple[float, ...]:
         """Best fitness per generation of the genetic search, equation (6), of the best trial."""
         return min(self.trials, key=lambda t: t.fitness).history
+
+    @property
+    def of_responses(self) -> bool:
+        """Whether it was made from frequency responses alone, without a record."""
+        return bool(self.response_digests) and not self.digests
 
     @property
     def falsified(self) -> bool:
@@ -219,7 +237,7 @@ class Identification(SavedResult):
         return text
 
     def plot(self, records: Record | Sequence[Record] | None = None, axis: str = "rotary") -> Figure:
-        """Draw measured against simulated velocity and the residual.
+        """Draw measured against simulated velocity and the residual; of frequency responses alone as `plot_bode`.
 
         Parameters
         ----------
@@ -238,12 +256,15 @@ class Identification(SavedResult):
         GaidentError
             Where a loaded identification is given no records, or `records` contains something else.
         """
+        if records is None and self.responses and not self.records:
+            return self.plot_bode(hz=True, axis=axis)
         return picture("plot_identification", self, self._drawn(records, "plot"), axis=axis)
 
     def plot_bode(self, records: Record | Sequence[Record] | None = None, hz: bool = False, axis: str = "rotary") -> Figure:
         """Draw the model against the frequency response of the longest record, with coherence.
 
         In a loop with a command it is estimated by the command (joint input-output), else from torque to velocity (H1).
+        An identification of frequency responses shows these.
         A loaded identification without records shows the model alone.
 
         Parameters
@@ -267,6 +288,9 @@ class Identification(SavedResult):
         RecordError
             Where the record shows no frequency response.
         """
+        if records is None and self.responses:
+            late = 0.0 if self.delay is None else self.delay.value
+            return picture("plot_frequency_response", self.responses, self.model, hz, axis, late)
         return picture("plot_bode", self.model, self.controller, self._chosen(records), hz, axis)
 
     def plot_poles(self, hz: bool = False) -> Figure:
@@ -320,6 +344,9 @@ class Identification(SavedResult):
             "seconds": self.seconds,
             "samples": self.samples,
             "digests": list(self.digests),
+            "frequencies": self.frequencies,
+            "delay": None if self.delay is None else asdict(self.delay),
+            "response_digests": list(self.response_digests),
             "initial_states": {d: list(s) for d, s in self.initial_states.items()},
             "controller_numbers": {name: asdict(e) for name, e in self.controller_numbers.items()},
             "covariance": None if self.covariance is None else [list(row) for row in self.covariance],
@@ -359,4 +386,7 @@ class Identification(SavedResult):
                 version=data["gaident_version"],
                 controller_numbers={name: Estimate(**e) for name, e in data.get("controller_numbers", {}).items()},
                 covariance=rows_of(data.get("covariance")),
+                frequencies=data.get("frequencies", 0),
+                delay=Estimate(**data["delay"]) if data.get("delay") else None,
+                response_digests=tuple(data.get("response_digests", ())),
             )

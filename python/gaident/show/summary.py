@@ -66,17 +66,28 @@ def _verdict(idn: Identification, axis: str, scales: Scales) -> list[str]:
     elif idn.adequacy.undecided:
         stands = "whether a linear model holds is UNDECIDED"
     records, v = len(idn.digests), velocity_unit(axis)
-    figures = (
-        f"fit {number(idn.fit_percent)} %",
-        ", ".join(filter(None, (f"rmse {number(idn.rmse)} {v}", beside(scales, "", idn.rmse, None, v)))),
-        f"white part of it {number(idn.adequacy.noise_std)} {velocity_unit(axis)}",
-        f"{idn.samples} samples of {records} record{'s' if records != 1 else ''}",
-    )
+    given = len(idn.response_digests)
+    of = [f"{idn.samples} samples of {records} record{'s' if records != 1 else ''}"] if records else []
+    of += [f"{idn.frequencies} frequencies of {given} response{'s' if given != 1 else ''}"] if given else []
+    if idn.of_responses:
+        off = f"rms of the relative error {number(100.0 * idn.rmse)} %"
+        figures: tuple[str, ...] = (f"fit {number(idn.fit_percent)} %", off, *of)
+    else:
+        figures = _of_velocity(idn, scales, v, of)
     return [
         f"(p,q) = ({idn.p},{idn.q}), {structure_words(idn.p, idn.q)}; {stands}",
         *textwrap.wrap(idn.adequacy.sentence, WIDTH),
         ", ".join(figures),
     ]
+
+
+def _of_velocity(idn: Identification, scales: Scales, v: str, of: list[str]) -> tuple[str, ...]:
+    return (
+        f"fit {number(idn.fit_percent)} %",
+        ", ".join(filter(None, (f"rmse {number(idn.rmse)} {v}", beside(scales, "", idn.rmse, None, v)))),
+        f"white part of it {number(idn.adequacy.noise_std)} {v}",
+        *of,
+    )
 
 
 def _loop(controller: Controller | None, axis: str) -> str:

@@ -11,7 +11,7 @@ import pytest
 
 import gaident as ga
 from gaident.errors import GaidentError, RecordError
-from gaident.identification.frequency import measured_response, response_of, sampled_response
+from gaident.identification.response.averaged import measured_response, response_of, sampled_response
 
 DT = 1e-3
 PLANT = ga.TwoMass(JM=2e-4, DM=1e-3, JL=3e-4, DL=1e-3, KG=12.0, DG=2e-3).model()

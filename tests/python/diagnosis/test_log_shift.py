@@ -200,6 +200,18 @@ def test_in_open_loop_a_motion_before_its_torque_is_the_log_s_and_a_delay_is_onl
         assert aligned([late], [], None, follows=True).notes == ()
 
 
+def test_of_velocity_and_position_the_one_that_the_torque_contradicts_is_moved() -> None:
+    """Both are of one motion. A velocity behind its position may be a sensor's, so that nothing is moved there."""
+    rec = rig(RIGID, STEPS, FRICTION, position_logged=True)
+    assert looked_at(rec, None) == ({}, aligned([rec], [], None)) and aligned([rec], [], None).notes == ()
+    for moved, back in (({"position": 1}, {"position": -1}), ({"position": -1}, {"position": 1}),
+                        ({"velocity": -1}, {"velocity": 1}), ({"torque": 1}, {"torque": -1}), ({"velocity": 1}, {})):  # fmt: skip
+        moves, found = looked_at(rec.shifted(**moved), None)
+        assert moves == back and len(found.notes) == 1, (moved, moves, found.notes)
+        assert found.may_be_early == (not back)
+    assert "no delay of the drive" in found.notes[0] and "shift velocity=-1" in found.notes[0]
+
+
 def slow(effects: dict[str, dict[str, float]]) -> tuple[ga.Record, ga.Cascade]:
     """A log of a controller that samples twice to a line, with its rule, and that controller."""
     pi = ga.PI(0.03, 1.9, rule="backward")

@@ -31,6 +31,7 @@ ALLOWED = {
         "the interpreter's hook, put back at once, and the frames of an error that was caught",
     ),
     "data/signals/arrays": ({"copy.flags.writeable"}, "NumPy: how an array is made read-only"),
+    "data/frequency/response": ({"copy.flags.writeable"}, "the same"),
     "data/signals/decimation": ({"taps.flags.writeable"}, "the same"),
     "estimation/parameterisation": ({"values.flags.writeable"}, "the same"),
     "identification/replay/replay": ({"shared.flags.writeable"}, "the same"),

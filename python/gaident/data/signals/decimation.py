@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from gaident.errors import RecordError
 
-__all__ = ["Decimator", "decimated", "factor_of", "low_passed"]
+__all__ = ["Decimator", "decimated", "factor_of", "low_passed", "reach"]
 
 _HALF = 25  # no decision: a formula: a low-pass
 """Taps on each side, in samples of the decimated signal."""
@@ -45,7 +45,7 @@ class Decimator:
 
     def __init__(self, factor: int) -> None:
         self.factor = factor_of(factor)
-        self.half = _HALF * self.factor if self.factor > 1 else 0
+        self.half = reach(self.factor)
         self.taps = _taps(self.half, self.factor)
         # Samples not yet done with; the first stands `half` before the next y, once the start was continued.
         self.kept = np.zeros(0)
@@ -92,6 +92,11 @@ def _taps(half: int, ratio: float) -> NDArray[np.float64]:
     taps /= taps.sum()
     taps.flags.writeable = False
     return np.asarray(taps)
+
+
+def reach(factor: int) -> int:
+    """Samples on either side that a low-passed sample is made of; closer to an end it contains what was never logged."""
+    return _HALF * factor if factor > 1 else 0
 
 
 def low_passed(x: NDArray[np.float64], ratio: float) -> NDArray[np.float64]:

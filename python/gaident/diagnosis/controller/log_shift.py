@@ -16,6 +16,9 @@ Moving a commanded torque by b is right in either case: a delay of the drive the
 between torque and shaft, and is found there.
 A measured torque stands behind that delay, and is moved only where L agrees.
 
+Where velocity and position are logged, they are of one motion: which of the two stands whole samples beside the other, the torque
+says (`_of_angle`).
+
 A motion behind its torque needs no explanation where the torque follows from the controller, which reads and writes on the same
 lines, or where what the model has accounts for it.
 Delay, lag, filter and the age of the velocity make a slow motion late by their sum.
@@ -35,6 +38,7 @@ from gaident.data.record import Record
 from gaident.data.torque_kind import MEASURED
 from gaident.diagnosis.controller.as_read import in_terms_of_the_log
 from gaident.estimation.criterion import gained
+from gaident.estimation.regression.sensor_lag import velocity_lag
 from gaident.estimation.regression.torque_lag import TorqueLag, torque_lag
 from gaident.identification.notes import reading_notes
 from gaident.identification.replay.replay import replay
@@ -58,6 +62,7 @@ class Aligned:
 
     given: digest of a record as it is here -> as it was given. notes: what was moved, and what may have to be.
     behind: note on a motion behind its torque -> the record's name, the motion's lag and the sample time [s].
+    velocity_late: whether a velocity stands whole samples behind its position, and was not moved.
     """
 
     records: tuple[Record, ...]
@@ -66,11 +71,12 @@ class Aligned:
     shifts: Mapping[str, Mapping[str, int]] = field(default_factory=dict)
     given: Mapping[str, Record] = field(default_factory=dict)
     behind: Mapping[Text, tuple[str, TorqueLag, float]] = field(default_factory=dict)
+    velocity_late: bool = False
 
     @property
     def may_be_early(self) -> bool:
-        """Whether a motion is behind its torque by whole samples, as where the log wrote the torque early."""
-        return any(_whole(lag) and round(lag.lag) != 0 for _, lag, _ in self.behind.values())
+        """Whether the torque may have been written early, or the velocity late: the motion is behind by whole samples."""
+        return self.velocity_late or any(_whole(lag) and round(lag.lag) != 0 for _, lag, _ in self.behind.values())
 
     def noted(self, result: Diagnosis) -> Diagnosis:
         """The result, in terms of the records that were given; a motion behind its torque is explained where the model does."""
@@ -91,12 +97,17 @@ def aligned(
     shifts: dict[str, Mapping[str, int]] = {}
     given: dict[str, Record] = {}
     behind: dict[Text, tuple[str, TorqueLag, float]] = {}
+    late: list[Record] = []
 
     def one(rec: Record) -> Record:
         moves, note = _of_law(rec, controller)
         lag = torque_lag(rec) if controller is None and not follows else None
         if lag is not None:
-            moves, note = _of_motion(lag, refuted)
+            of_angle = _of_angle(velocity_lag(rec), lag)
+            moves, note = of_angle or _of_motion(lag, refuted)
+            if of_angle is not None:
+                lag = None  # of the position's line, which is not the motion's
+                late.extend([rec] * (not moves))
         if note:
             name = f"{rec.name}: " if len(records) + len(validation) > 1 and rec.name else ""
             note = joined("", (name, note))
@@ -109,7 +120,8 @@ def aligned(
         given[moved.digest] = rec
         return moved
 
-    return Aligned(tuple(map(one, records)), tuple(map(one, validation)), tuple(notes), shifts, given, behind)
+    moved = tuple(map(one, records)), tuple(map(one, validation))
+    return Aligned(*moved, tuple(notes), shifts, given, behind, bool(late))
 
 
 def _of_law(rec: Record, controller: PI | None) -> tuple[Mapping[str, int], Text]:
@@ -222,6 +234,37 @@ def _measured_note(b: int, lag: TorqueLag | None) -> Text:
     if lag is not None:
         where = f"The motion puts it {_samples(lag.lag)} {'behind' if lag.lag > 0 else 'before'} its place"
     return say(text, _samples(b), where, f"shift torque={-b}")
+
+
+def _of_angle(behind: float | None, lag: TorqueLag) -> tuple[Mapping[str, int], Text] | None:
+    """(channel -> samples by which it is moved, note) where velocity and position stand on different lines; else None.
+
+    behind: of the velocity, behind the position [samples]; lag: of the torque, behind the motion that the position shows.
+    """
+    whole = 0 if behind is None else round(behind)
+    if behind is None or whole == 0 or abs(behind - whole) >= POLICY.lag_whole:
+        return None
+    apart = say("The velocity stands {} {} the position", _samples(behind), "behind" if behind > 0.0 else "before")
+    if _whole(lag) and round(lag.lag) == whole:  # velocity and torque agree
+        text = (
+            "{}, and the {torque} stands where the velocity does: the log wrote the position {} {}. It was moved by {:+d}, and "
+            "everything below is of that."
+        )
+        return {"position": whole}, say(text, apart, _samples(whole), "early" if whole > 0 else "late", whole)
+    if not (_whole(lag) and round(lag.lag) == 0):
+        return None
+    if behind < 0.0:
+        text = (
+            "{}, which no sensor does, and the {torque} stands where the position does: the log wrote the velocity {} early. It "
+            "was moved by {:+d}, and everything below is of that."
+        )
+        return {"velocity": -whole}, say(text, apart, _samples(whole), -whole)
+    text = (
+        "{}, and the {torque} stands where the position does: a sensor that is late, or a log that wrote the velocity late, and "
+        "no delay of the drive, whatever is called so below. Where you know that it is the log, read it with {}. Nothing was "
+        "moved."
+    )
+    return {}, say(text, apart, f"shift velocity={-whole}")
 
 
 def _of_motion(lag: TorqueLag, refuted: bool) -> tuple[Mapping[str, int], Text]:

@@ -6,6 +6,7 @@
     std     = sqrt(J_min/(n_eff c)),   J(k) = J_min + c (k - lag)^2
 
 All channels pass the filter of the regression, and the low-pass of its decimation; but every sample is kept.
+No row contains what lies before or behind the record: continued beyond a jump at its start, torque and motion do not fit.
 With one row in ten the lag depended on which of them the log began with, by 0.05 to 0.1 samples where the load swings.
 A lightly damped resonance above the filter's corner turns no phase, so an elastic axis has the lag of a rigid one.
 A motion before its torque, lag > 0, is nothing that an axis can do; a motion behind it, lag < 0, is what a delay makes.
@@ -19,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gaident.data.record import Record
-from gaident.data.signals.decimation import low_passed
+from gaident.data.signals.decimation import low_passed, reach
 from gaident.estimation.criterion import effective_samples
 from gaident.estimation.regression.motion import ORDER, cutoff_of, motion_of
 from gaident.estimation.regression.regression import solve
@@ -58,7 +59,8 @@ def torque_lag(rec: Record, cutoff_hz: float | None = None) -> TorqueLag | None:
     torque = motion.torque
     assert torque is not None
     kept = ~motion.still
-    kept[: 2 * factor] = kept[-2 * factor :] = False  # filters start there
+    edge = max(2 * factor, reach(factor))
+    kept[:edge] = kept[-edge:] = False  # filters start there
     if np.count_nonzero(kept[::factor]) < POLICY.least_rows:
         return None
     columns = np.column_stack([low_passed(np.ascontiguousarray(c), factor) for c in columns_of(terms, motion).T])[kept]

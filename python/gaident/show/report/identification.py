@@ -25,6 +25,7 @@ from gaident.show.report.parts import (
     tile,
 )
 from gaident.show.report.views import View
+from gaident.show.response_plots import response_chart
 from gaident.show.search_charts import convergence_chart, roots_chart, structures_chart
 from gaident.show.summary import flags_of, inconsistency_words, meaning_of, stem_of
 from gaident.show.wording import number as plain_number
@@ -45,7 +46,7 @@ def headline(idn: Identification) -> str:
         return f"The closest linear model is {what}, but the data contradict it: do not trust its mechanical parameters."
     if idn.adequacy.undecided:
         return f"The closest linear model is {what}; whether a linear model holds, this record cannot tell."
-    return f"A linear model explains the record: {what}."
+    return f"A linear model explains the {'frequency response' if idn.of_responses else 'record'}: {what}."
 
 
 def mark(idn: Identification) -> tuple[str, str, str]:
@@ -58,6 +59,12 @@ def mark(idn: Identification) -> tuple[str, str, str]:
 def tiles(idn: Identification, view: View) -> Html:
     """The figures seen first."""
     v = velocity_unit(view.axis)
+    if idn.of_responses:
+        return joined((
+            tile("fit, weighed by the deviations (in-sample)", typeset(f"{idn.fit_percent:.2f} %")),
+            tile("rms of the relative error (in-sample)", typeset(f"{plain_number(100.0 * idn.rmse)} %")),
+            tile("frequencies", str(idn.frequencies)),
+        ))  # fmt: skip
     return joined((
         tile("fit of the free run (in-sample)", typeset(f"{idn.fit_percent:.2f} %")),
         tile("error (in-sample)", number(idn.rmse), v),
@@ -67,10 +74,15 @@ def tiles(idn: Identification, view: View) -> Html:
 
 def chapters(idn: Identification, view: View, drawn: Charts) -> list[Section]:
     """All of them."""
-    noise = idn.adequacy.noise_std
+    noise, sentence = idn.adequacy.noise_std, tag("p", typeset(idn.adequacy.sentence))
+    if idn.of_responses:
+        again = "The diagram needs the frequency response: a saved result does not contain it. Identify it again with --report."
+        shown = drawn.put(response_chart(view.response, view.axis)) if view.response else box(tag("p", again), kind="quiet")
+        first = [Section("measured", "Measured against the model", shown), Section("wrong", "What is wrong", sentence)]
+    else:
+        first = [measured_section(view, noise, drawn), missing_section(view, noise, drawn, sentence)]
     return [
-        measured_section(view, noise, drawn),
-        missing_section(view, noise, drawn, tag("p", typeset(idn.adequacy.sentence))),
+        *first,
         _cause(idn),
         _parameters(idn, view, drawn),
         _structures(idn, view, drawn),
@@ -128,7 +140,7 @@ def _parameters(idn: Identification, view: View, drawn: Charts) -> Section:
     parts.append(table(columns, [[_root(idn.parameters, stem) for stem in stems]]))
     parts.append(tag("p", tag("small", "± is one standard deviation, the colour of the noise taken into account.")))
     parts.append(drawn.put(roots_chart(idn)))
-    parts.append(response_part(view, drawn))
+    parts.append("" if idn.of_responses else response_part(view, drawn))
     return Section("parameters", "Parameters", *parts)
 
 
@@ -182,4 +194,6 @@ def _how(idn: Identification, view: View) -> Section:
         "made with": f"gaident {idn.version or 'of unknown version'}",
         "page made with": ", ".join(f"{k} {v}" for k, v in view.made_with.items()),
     }
-    return Section("how", "How this was computed", facts(rows), records_table(view.runs, idn.digests, ()))
+    if idn.response_digests:
+        rows["frequency responses"] = joined(tag("code", d, class_="hash") for d in idn.response_digests)
+    return Section("how", "How this was computed", facts(rows), records_table(view.runs, idn.digests, ()) if idn.digests else "")

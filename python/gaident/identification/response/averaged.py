@@ -16,6 +16,8 @@ suffers both alike, so that these two may be compared where the bare curve of th
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -23,15 +25,16 @@ from gaident.arguments import TORQUE
 from gaident.axis import say
 from gaident.control.pi import PI
 from gaident.control.pi_torque import pi_torque
+from gaident.data.frequency.response import FrequencyResponse
 from gaident.data.record import Record
 from gaident.errors import RecordError
 from gaident.models.held_torque import held_mean
 from gaident.models.model import Model
 from gaident.models.simulate import Run, run
 from gaident.policy.table import POLICY
-from gaident.results.frequency import FrequencyResponse, Responses
+from gaident.results.frequency import AveragedResponse, Responses
 
-__all__ = ["measured_response", "response_of", "sampled_response", "simulated_response"]
+__all__ = ["measured_response", "response_of", "responses_of", "sampled_response", "simulated_response"]
 
 Vector = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -56,17 +59,44 @@ def response_of(rec: Record, model: Model, controller: PI | None = None) -> Resp
     # no decision: drawn: beyond, a curve runs away
     sound = bool(np.all(np.isfinite(done.velocity)) and np.abs(done.velocity).max() < 1e3 * np.abs(rec.velocity).max())
     low, high = float(measured.frequency[0]), float(measured.frequency[-1])
-    fine = np.geomspace(low, high, 600)
-    roots = [r for r in (*model.poles, *model.zeros) if r.imag > 0.0]
-    # no decision: drawn: points of a curve
-    near = [(r.imag + max(abs(r.real), 1e-6 * r.imag) * np.linspace(-5.0, 5.0, 61)) / (2.0 * np.pi) for r in roots]
-    fine = np.unique(np.concatenate([fine, *(f[(f > low) & (f < high)] for f in near)]))
+    fine = _fine(model, low, high)
     return Responses(
         measured, simulated_response(done, rec) if sound else None, fine, sampled_response(model, fine, rec.dt, controller)
     )
 
 
-def measured_response(rec: Record, controller: PI | None = None) -> FrequencyResponse:
+def responses_of(given: Sequence[FrequencyResponse], model: Model | None, delay: float = 0.0) -> Responses:
+    """The same of responses that were given, all in one, and of a model behind a delay [s]; None: without a model."""
+    frequency = np.concatenate([r.frequency_hz for r in given])
+    order = np.argsort(frequency, kind="stable")
+    value = np.concatenate([r.velocity_response for r in given])
+    nothing = [np.zeros(len(r)) for r in given]
+    std = [n if r.std is None else r.relative_std * np.abs(r.velocity_response) for r, n in zip(given, nothing, strict=True)]
+    coherence = [n + 1.0 if r.coherence is None else r.coherence for r, n in zip(given, nothing, strict=True)]
+    measured = AveragedResponse(
+        frequency[order], value[order], np.concatenate(std)[order], np.concatenate(coherence)[order],
+        np.concatenate(nothing), instrument=False, windows=0, resolution=0.0, given=True,
+    )  # fmt: skip
+    if model is None:
+        return Responses(measured, None, np.zeros(0), np.zeros(0, complex))
+    fine = _fine(model, float(frequency.min()), float(frequency.max()))
+    dt = next((r.dt for r in given if r.dt is not None), None)
+    if dt is not None:
+        fine = fine[fine < 0.5 / dt]  # no decision: a formula: half the sampling frequency
+    own = model.mechanism.frequency_response(2.0 * np.pi * fine) if dt is None else sampled_response(model, fine, dt)
+    return Responses(measured, None, fine, own * np.exp(-2j * np.pi * fine * delay))
+
+
+def _fine(model: Model, low: float, high: float) -> Vector:
+    """Frequencies [Hz] at which a curve is drawn, more of them where it has its peaks."""
+    fine = np.geomspace(low, high, 600)  # no decision: drawn: points of a curve
+    roots = [r for r in (*model.poles, *model.zeros) if r.imag > 0.0]
+    # no decision: drawn: points of a curve
+    near = [(r.imag + max(abs(r.real), 1e-6 * r.imag) * np.linspace(-5.0, 5.0, 61)) / (2.0 * np.pi) for r in roots]
+    return np.unique(np.concatenate([fine, *(f[(f > low) & (f < high)] for f in near)]))
+
+
+def measured_response(rec: Record, controller: PI | None = None) -> AveragedResponse:
     """The response that a record shows. controller: of its loop, makes the torque where none is logged; None: open loop.
 
     Raises RecordError where there is neither a torque nor command and controller, for a torque that never changes, and for a loop
@@ -90,7 +120,7 @@ def measured_response(rec: Record, controller: PI | None = None) -> FrequencyRes
     return _estimate(torque, rec.velocity, rec.command, rec.dt)
 
 
-def simulated_response(run: Run, rec: Record) -> FrequencyResponse:
+def simulated_response(run: Run, rec: Record) -> AveragedResponse:
     """The same estimate of a simulated run of that record: what the model would have shown."""
     return _estimate(run.torque, run.velocity, rec.command, rec.dt)
 
@@ -122,7 +152,7 @@ def _averages(windows: int, count: NDArray[np.intp]) -> Vector:
     return np.asarray(windows * count / (pairs(SAME) + 2.0 * (1.0 - 1.0 / windows) * pairs(NEXT)))
 
 
-def _estimate(u: Vector, w: Vector, command: Vector | None, dt: float) -> FrequencyResponse:
+def _estimate(u: Vector, w: Vector, command: Vector | None, dt: float) -> AveragedResponse:
     """From torque u to velocity w; a command that never changes is no instrument."""
     n = len(w)
     size = max(16, min(2 * n // (WINDOWS + 1), LONGEST))  # no decision: a grid: the lines of a spectrum
@@ -158,7 +188,7 @@ def _estimate(u: Vector, w: Vector, command: Vector | None, dt: float) -> Freque
     frequency = np.add.reduceat(f, first) / count
     with np.errstate(divide="ignore"):
         threshold = 1.0 - POLICY.coherence_level ** (1.0 / np.maximum(averages - 1.0, 0.0))
-    return FrequencyResponse(
+    return AveragedResponse(
         frequency=frequency[known],
         value=value[known],
         std=np.nan_to_num(std)[known],

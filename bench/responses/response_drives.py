@@ -1,0 +1,136 @@
+"""Structure and parameters of random drives from one frequency response each, with 1 % of noise.
+
+    python bench/responses/response_drives.py [--cases 100] [--seed 1] [--held] [--peer]
+
+Chains of one, two and three masses in turn, 60 to 200 frequencies from 1 to 450 Hz, standard deviations stated in every second.
+A mass counts as shown where the best chain that is smaller, fitted to the response without noise, is worse by more than ten
+units of BIC, whatever the noise does to them: chance moves the gain D in 2 ln(likelihood) by 2 sqrt(D), of which three are left.
+--held: behind a hold of 1 ms.
+--peer: the same responses to scikit-rf's vector fitting (where it is installed), which is told the true order.
+"""
+
+from __future__ import annotations
+
+import argparse
+import time
+from typing import Any
+
+import numpy as np
+import scipy.linalg
+
+import gaident as ga
+
+NOISE = 0.01
+F = (1.0, 450.0)
+
+
+def chain(rng: np.random.Generator, masses: int) -> ga.Model:
+    """A chain of masses on damped shafts, from its equations of motion."""
+    J = 10.0 ** rng.uniform(-4.5, -2.0) * 10.0 ** rng.uniform(-0.5, 0.5, masses)
+    f = np.sort(rng.uniform(15.0, 200.0, masses - 1))
+    while masses == 3 and f[1] < 1.5 * f[0]:
+        f = np.sort(rng.uniform(15.0, 200.0, 2))
+    both = J[:-1] * J[1:] / (J[:-1] + J[1:])
+    K, Z = (2.0 * np.pi * f) ** 2 * both, 2.0 * rng.uniform(0.01, 0.04, masses - 1) * 2.0 * np.pi * f * both
+    A, B = np.zeros((2 * masses - 1, 2 * masses - 1)), np.zeros(2 * masses - 1)  # velocities, twists
+    A[range(masses), range(masses)] = -rng.uniform(0.3, 5.0, masses)
+    for i in range(masses - 1):
+        A[masses + i, i], A[masses + i, i + 1] = 1.0, -1.0
+        for a, b in ((i, i + 1), (i + 1, i)):
+            A[a, a] -= Z[i] / J[a]
+            A[a, b] += Z[i] / J[a]
+            A[a, masses + i] += (-K[i] if a == i else K[i]) / J[a]
+    B[0] = 1.0 / J[0]
+    n = len(A)
+    C = np.eye(n)[0]
+    system = np.block([[A, B[:, None]], [C[None, :], np.zeros((1, 1))]])
+    zeros = scipy.linalg.eigvals(system, np.diag([1.0] * n + [0.0]))
+    return ga.Model(1.0 / J[0], list(np.linalg.eigvals(A)), list(zeros[np.isfinite(zeros) & (np.abs(zeros) < 1e9)]))
+
+
+def exact(model: ga.Model, f: np.ndarray, dt: float | None) -> np.ndarray:
+    """The response, behind a hold by the difference equation."""
+    if dt is None:
+        return model.frequency_response(2.0 * np.pi * f)
+    equation = model.discrete(dt)
+    back = np.exp(-2j * np.pi * np.outer(f * dt, np.arange(len(equation.alpha))))
+    return (back @ equation.alpha) / (1.0 - back[:, 1:] @ equation.beta)
+
+
+def shown_masses(model: ga.Model, f: np.ndarray, dt: float | None) -> int:
+    """Masses that the response shows: a smaller chain is worse by more than ten units of BIC at this noise."""
+    g = exact(model, f, dt)
+    clean = ga.identify(ga.FrequencyResponse(f, g, NOISE * np.abs(g), dt=dt), space=None)
+    largest = 1 + model.q // 2
+    sums = {s.q: s.error_sum for s in clean.structures if s.p == 1}
+    for masses in range(1, largest):
+        # With noise the sum of a chain is 2 n more.
+        smaller, size = sums.get(2 * (masses - 1), np.inf), 2.0 * len(f)
+        gain = size * np.log1p(smaller / size)
+        if gain - 6.0 * np.sqrt(gain) - 4.0 * (largest - masses) * np.log(size) < 10.0:
+            return masses
+    return largest
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--cases", type=int, default=100)
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--held", action="store_true")
+    parser.add_argument("--peer", action="store_true")
+    options = parser.parse_args()
+    dt = 1e-3 if options.held else None
+    right = unseen = false = 0
+    inside: list[np.ndarray] = []
+    seconds, errors, others = [], [], []
+    for i in range(options.cases):
+        rng = np.random.default_rng([options.seed, i])
+        model = chain(rng, 1 + i % 3)
+        f = np.geomspace(*F, int(rng.integers(60, 200)))
+        e = rng.standard_normal((2, len(f)))
+        g = exact(model, f, dt) * (1.0 + NOISE / np.sqrt(2.0) * (e[0] + 1j * e[1]))
+        began = time.perf_counter()
+        idn = ga.identify(ga.FrequencyResponse(f, g, NOISE * np.abs(g) if i % 2 else None, dt=dt))
+        seconds.append(time.perf_counter() - began)
+        false += idn.falsified
+        if (idn.p, idn.q) == (1, model.q):
+            right += 1
+            found, truth = (ga.factor_parameters(m)[1] for m in (idn.model, model))
+            assert idn.covariance is not None
+            inside.append(np.abs(found - truth) < 1.96 * np.sqrt(np.diag(np.array(idn.covariance))))
+        elif shown_masses(model, f, dt) < 1 + model.q // 2 and (idn.p, idn.q) == (1, 2 * (shown_masses(model, f, dt) - 1)):
+            unseen += 1  # the mass that is missing does not show
+        else:
+            print(f"case {i}: ({idn.p},{idn.q}) for (1,{model.q}), falsified {idn.falsified}")
+        if options.peer:
+            truth = exact(model, f, None)
+            errors.append(off(idn.model.frequency_response(2.0 * np.pi * f), truth))
+            others.append(off(vector_fitted(f, g, model), truth))
+    print(f"{options.cases} drives: structure right {right}, a mass that does not show left out {unseen}, ", end="")
+    print(f"other {options.cases - right - unseen}, falsified {false}")
+    print(f"95 % intervals that contain the truth: {100.0 * np.mean(np.concatenate(inside)):.1f} % of {sum(map(len, inside))}")
+    print(f"median {np.median(seconds):.2f} s, longest {np.max(seconds):.2f} s")
+    if options.peer:
+        own, other = np.median(errors), np.median(others)
+        print(f"rms relative error of the response, medians: {own:.2%}, vector fitting {other:.2%}")
+    assert right + unseen >= 0.98 * options.cases, "the structure is right in less than 98 of 100"
+
+
+def off(g: np.ndarray, truth: np.ndarray) -> float:
+    """Root mean square of the relative error."""
+    return float(np.sqrt(np.mean(np.abs(g / truth - 1.0) ** 2)))
+
+
+def vector_fitted(f: np.ndarray, g: np.ndarray, model: ga.Model) -> Any:
+    """The same response by scikit-rf, told how many real poles and pairs there are."""
+    import skrf
+    import skrf.vectorFitting
+
+    network = skrf.Network(frequency=skrf.Frequency.from_f(f, unit="hz"), s=g.reshape(-1, 1, 1))
+    fit = skrf.vectorFitting.VectorFitting(network)
+    fit.vector_fit(n_poles_real=1, n_poles_cmplx=model.q // 2, fit_constant=False, fit_proportional=False)
+    return fit.get_model_response(0, 0, f)
+
+
+if __name__ == "__main__":
+    main()

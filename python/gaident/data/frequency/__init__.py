@@ -1,0 +1,1 @@
+"""Measured frequency responses, and their text files."""

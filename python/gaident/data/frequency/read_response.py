@@ -1,0 +1,199 @@
+"""read_response: a text file with a measured frequency response to a FrequencyResponse."""
+
+from __future__ import annotations
+
+import math
+import os
+import re
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gaident.arguments import arg
+from gaident.checks import above_zero, checked_path, known_keys
+from gaident.data.formats.delimited import TextOptions, open_text
+from gaident.data.formats.table import Column, LogTable
+from gaident.data.frequency.response import FrequencyResponse
+from gaident.errors import ReadError
+
+__all__ = ["COLUMNS", "UNITS", "read_response"]
+
+Vector = NDArray[np.float64]
+
+COLUMNS = {
+    "frequency": r"f|freq\w*|fr[eé]q\w*|frec\w*|omega|w",
+    "magnitude": r"mag\w*|amplitud\w*|gain|betrag|verst\w*|modul\w*|abs|\|?[gh]\|?|\|[gh]\(.*\)\||ampl\w*",
+    "phase": r"phas\w*|fase|arg(\(.*\))?|angle|winkel",
+    "real": r"re|real\w*|re\(.*\)",
+    "imaginary": r"im|imag\w*|im\(.*\)",
+    "coherence": r"coh\w*|koh\w*|gamma\w*",
+    "std": r"std|sigma|stddev",
+}
+"""What a column's first word is, for each quantity."""
+
+_DEGREE = math.pi / 180.0  # no decision: a unit; rad
+UNITS: dict[str, dict[str, float]] = {
+    "frequency": {"hz": 1.0, "khz": 1e3, "rad/s": 0.5 / math.pi},  # no decision: a unit
+    "magnitude": {"db": math.nan, "1": 1.0},
+    "phase": {"deg": _DEGREE, "°": _DEGREE, "grad": _DEGREE, "rad": 1.0},
+    "coherence": {"1": 1.0, "%": 0.01},  # no decision: a unit
+}
+"""Factor to Hz, 1, rad and 1; nan: decibels."""
+
+_UNIT = re.compile(r"(.*?)[\s/_]*[\[(<{/_ ]\s*(khz|hz|rad/s|db|deg|grad|°|rad|%|1)\s*[\])>}]?", re.IGNORECASE)
+
+
+def read_response(
+    path: str | os.PathLike[str],
+    columns: Mapping[str, str | int] | None = None,
+    units: Mapping[str, str] | None = None,
+    kind: str = "torque to velocity",
+    dt: float | None = None,
+    *,
+    scale: float = 1.0,
+    name: str | None = None,
+    delimiter: str | None = None,
+    decimal: str | None = None,
+    skip: int | None = None,
+    encoding: str | None = None,
+) -> FrequencyResponse:
+    """Read a frequency response from a text table: frequency, and magnitude and phase or real and imaginary part.
+
+    Rows may come in any order; a row at 0 Hz is left out, and so are rows from half the sampling frequency on. Notes say so.
+
+    Parameters
+    ----------
+    path : str or path-like
+        The file.
+    columns : mapping of str to str or int, optional
+        Quantity -> column: frequency, magnitude, phase, real, imaginary, coherence, std.
+        One that is not given is guessed by its name.
+    units : mapping of str to str, optional
+        Quantity -> unit: frequency "Hz", "kHz" or "rad/s"; magnitude "dB" or "1" (plain numbers); phase "deg" or "rad";
+        coherence "1" or "%". What is not given is taken from the column's name.
+    kind : {"torque to velocity", "torque to position", "torque to acceleration"}
+        What was measured, see `FrequencyResponse`.
+    dt : float, optional
+        Sample time [s] of a measurement by a drive, see `FrequencyResponse`.
+    scale : float
+        What 1 of the file is in rad/s/(N m) (m/s/N; or rad, rad/s^2 per N m, by `kind`); pi/30 for rpm/(N m).
+    name : str, optional
+        What reports call it; None: the file's name.
+    delimiter, decimal, skip, encoding : optional
+        How the text is written, see `read`; None: found out.
+
+    Returns
+    -------
+    FrequencyResponse
+        The response.
+
+    Raises
+    ------
+    ReadError
+        Where a column or a unit is missing, with what to give; as `read` for damaged files.
+    RecordError
+        As `FrequencyResponse`.
+
+    Examples
+    --------
+    >>> import pathlib, tempfile
+    >>> import gaident as ga
+    >>> rows = [f"{f},{20 - 0.1 * f},{-90 - f}" for f in range(1, 31)]
+    >>> file = pathlib.Path(tempfile.mkdtemp()) / "bode.csv"
+    >>> _ = file.write_text("\\n".join(["frequency [Hz],magnitude [dB],phase [deg]", *rows]))
+    >>> ga.read_response(file)
+    FrequencyResponse('bode.csv', 30 frequencies, 1..30 Hz, torque to velocity)
+    """
+    file = checked_path(path, "path", ReadError)
+    if not file.is_file():
+        raise ReadError(f"{path}: there is no such file; give the path of a text table")
+    scale = above_zero(scale, "scale", ReadError, "give a number above 0, what 1 of the file is in SI units")
+    table = open_text(str(path), file, TextOptions(delimiter, decimal, skip, encoding))
+    if table.batches is not None:
+        raise ReadError(f"{path}: too long for a frequency response; give a table of frequencies, or read a log with read()")
+    found = _columns(table, dict(columns or {}))
+    asked = known_keys(units or {}, "units", list(UNITS), (), ReadError)
+    values = {key: table.numbers(column, key) for key, column in found.items()}
+    factor = {key: _factor(table, key, found[key], asked.get(key)) for key in found if key in UNITS}
+    frequency = values["frequency"] * factor["frequency"]
+    if "real" in found:
+        response = values["real"] + 1j * values["imaginary"]
+    else:
+        decibels = math.isnan(factor["magnitude"])
+        # no decision: a unit: decibels
+        size = 10.0 ** (values["magnitude"] / 20.0) if decibels else values["magnitude"] * factor["magnitude"]
+        response = size * np.exp(1j * values["phase"] * factor["phase"])
+    more: dict[str, Any] = {}
+    if "coherence" in found:
+        more["coherence"] = values["coherence"] * factor["coherence"]
+    if "std" in found:
+        more["std"] = values["std"] * scale
+    order = np.argsort(frequency, kind="stable")
+    notes = []
+    at_zero = int(np.count_nonzero(frequency == 0.0))
+    if at_zero:
+        notes.append(f"{table.path}: the row at 0 Hz is left out.")
+        order = order[frequency[order] != 0.0]
+    if dt is not None and isinstance(dt, int | float) and dt > 0.0:
+        below = frequency[order] < 0.5 / dt  # no decision: a formula: half the sampling frequency
+        if not below.all():
+            notes.append(f"{table.path}: {int(np.sum(~below))} rows from half the sampling frequency on are left out.")
+            order = order[below]
+    arrays: dict[str, Any] = {key: array[order] for key, array in more.items()}
+    called = file.name if name is None else name
+    return FrequencyResponse(frequency[order], scale * response[order], kind=kind, dt=dt, name=called, notes=notes, **arrays)
+
+
+def _columns(table: LogTable, given: Mapping[str, str | int]) -> dict[str, Column]:
+    """The column of each quantity. Raises ReadError where one is missing."""
+    asked = known_keys(given, "columns", list(COLUMNS), (), ReadError)
+    found = {key: table.find(given[key], key) for key in asked}
+    free = [column for column in table.columns if column.key not in {c.key for c in found.values()}]
+    for key, pattern in COLUMNS.items():
+        if key in found:
+            continue
+        named = [column for column in free if re.fullmatch(rf"({pattern})(\W.*)?", _parted(column)[0].strip(), re.IGNORECASE)]
+        if len(named) > 1:
+            names = ", ".join(repr(column.key) for column in named)
+            raise ReadError(
+                f"{table.path}: {len(named)} columns may be the {key}: {names}; say which in {_given('columns', key)}"
+            )
+        if named:
+            found[key] = named[0]
+    parts = ("real", "imaginary") if "real" in found or "imaginary" in found else ("magnitude", "phase")
+    for key in ("frequency", *parts):
+        if key not in found:
+            raise ReadError(
+                f"{table.path}: no column is known to be the {key}; {table.said()}; name it in {_given('columns', key)}"
+            )
+    for key in ("magnitude", "phase") if parts[0] == "real" else ():
+        found.pop(key, None)
+    return found
+
+
+def _given(argument: str, key: str) -> str:
+    """How a message names an argument; the command line has an option of its own for responses."""
+    return arg(f"response_{argument}", "...", key, f"{argument}={{{key!r}: ...}}")
+
+
+def _parted(column: Column) -> tuple[str, str | None]:
+    """(name, unit or None) of a column: as the table parted it, or by its spelling."""
+    if column.unit is not None:
+        return (column.names[0] if column.names else column.key), column.unit
+    match = _UNIT.fullmatch(column.key.strip())
+    return (match[1], match[2]) if match else (column.key, None)
+
+
+def _factor(table: LogTable, quantity: str, column: Column, given: object) -> float:
+    """What 1 of a column is. Raises ReadError where nothing says it."""
+    known = UNITS[quantity]
+    unit = _parted(column)[1] if given is None else given
+    if unit is None and quantity == "coherence":
+        unit = "1"
+    if isinstance(unit, str) and unit.strip().casefold() in known:
+        return known[unit.strip().casefold()]
+    names = " or ".join(repr({"hz": "Hz", "khz": "kHz", "db": "dB"}.get(u, u)) for u in known)
+    said = "does not say its unit" if unit is None else f"has the unit {unit!r}"
+    raise ReadError(f"{table.path}: the {quantity} in column {column.key!r} {said}: give {names} in {_given('units', quantity)}")

@@ -1,0 +1,1 @@
+"""Frequency responses: what a record shows of one, and models found from measured ones."""

@@ -1,0 +1,243 @@
+"""identify() of frequency responses alone."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+
+from gaident import _core
+from gaident.axis import Text, say
+from gaident.control import core
+from gaident.data.frequency.response import FrequencyResponse
+from gaident.errors import RecordError, SettingsError
+from gaident.estimation.criterion import bic
+from gaident.identification import selection
+from gaident.identification.noise import Autoregression
+from gaident.identification.response.delay import SMALL, STEPS, delay_step, freed, starts
+from gaident.identification.response.weighed import assessed_responses, weighed
+from gaident.identification.selection import Candidate
+from gaident.identification.structure_search import PERCENT, Assessed, ProgressCallback, StructureSearch
+from gaident.models.search_space import SearchSpace
+from gaident.policy.table import POLICY
+from gaident.results.estimate import Estimate
+from gaident.results.settings import Settings
+
+__all__ = ["ResponseSearch", "distinct_responses", "response_space", "told_of"]
+
+
+DIGITS = 1e-7  # no decision: rounding: of a value that is written with seven digits
+
+
+def distinct_responses(responses: Sequence[FrequencyResponse]) -> list[FrequencyResponse]:
+    """The responses in an order of their own, for sums must not depend on the one given; a RecordError where two are the same."""
+    ordered = sorted(responses, key=lambda r: (r.digest, r.name))
+    for one, next_one in pairwise(ordered):
+        if one.digest == next_one.digest:
+            raise RecordError(
+                "two frequency responses contain the same data: counted twice they halve every variance; leave one out"
+            )
+    return ordered
+
+
+def response_space(responses: Sequence[FrequencyResponse]) -> SearchSpace:
+    """Search ranges of responses: K about |G| omega, which a rigid axis has all along, roots where the frequencies lie.
+
+    From thirty times less to a thousand times more, as of records.
+    """
+    found = np.concatenate([np.abs(r.velocity_response) * r.omega for r in responses])
+    low, high = min(float(r.omega[0]) for r in responses), max(float(r.omega[-1]) for r in responses)
+    middle = float(np.median(found))
+    return SearchSpace(
+        gain=(middle / 30.0, middle * 1000.0),
+        real=(-0.1 * low, 10.0 * high),  # no decision: a start: a range to search
+        imaginary=(0.1 * low, high),  # no decision: a start: a range to search
+        p=(1, 3),
+        q=(0, 4),  # no decision: a start: up to three masses
+        source=f"derived from the responses: K about {middle:.4g}, {low / math.tau:.4g} to {high / math.tau:.4g} Hz",
+    )
+
+
+def told_of(responses: Sequence[FrequencyResponse]) -> dict[str, Any]:
+    """What an `Identification` says of its responses."""
+    return {
+        "frequencies": sum(len(r) for r in responses),
+        "response_digests": tuple(r.digest for r in responses),
+        "responses": tuple(responses),
+    }
+
+
+class ResponseSearch(StructureSearch):
+    """The search for the model behind frequency responses."""
+
+    def __init__(self, responses: Sequence[FrequencyResponse], space: SearchSpace, settings: Settings, workers: int) -> None:
+        if settings.arithmetic != "double":
+            raise SettingsError(
+                f"settings.arithmetic is {settings.arithmetic!r}: frequency responses are searched in double only; leave it out"
+            )
+        self.controller, self.space, self.settings, self.workers = None, space, settings, workers
+        self.responses = list(responses)
+        self.count = self.searched_count = 2 * sum(len(r) for r in self.responses)
+        self.runs = 1, 0
+        self._behind(None)
+
+    def _behind(self, delay: float | None) -> None:
+        """Take out a delay of the path [s]; None: there is none."""
+        self.delay = delay
+        self.parts = [replace(w, delay=delay or 0.0) for w in weighed(self.responses, continuous=False, scale=1.0)]
+        self.measured = [p.core() for p in self.parts]
+        self.experiment = self.searched = core.experiment([], None, 1.0, responses=self.measured)
+
+    def search(self, trials: int, seed: int, progress: ProgressCallback | None) -> list[_core.Trial]:
+        """See `StructureSearch`."""
+        self.runs = trials, seed
+        return super().search(trials, seed, progress)
+
+    def select(self, found: list[_core.Trial]) -> tuple[Assessed, list[Candidate]]:
+        """See `StructureSearch`; where no chain of masses holds, one behind a delay is looked for."""
+        best, scores = super().select(found)
+        holds = selection.is_chain(best.candidate) and not best.adequacy.falsified
+        if holds or self.delay is not None or not scores:
+            return best, scores
+        # A chain behind a delay is smaller than what makes up for one: it wins within the margin, as the smallest does.
+        delay = self._best_delay(min(c.bic for c in scores) + POLICY.rival_margin)
+        if delay is None:
+            return best, scores
+        self._behind(delay)
+        found[:] = super().search(*self.runs, None)
+        return super().select(found)
+
+    def _best_delay(self, less_than: float) -> float | None:
+        """The delay [s] of the first chain of masses that holds behind one, else of the least BIC; None: none below that."""
+        made: list[tuple[float, float]] = []
+        highest = max(float(r.omega[-1]) for r in self.responses)
+        for begin in starts(self.parts):
+            work = ResponseSearch(self.responses, self.space, self.settings, self.workers)
+            work._behind(begin)
+            scores = super(ResponseSearch, work).select(work.search(*self.runs, None))[1]
+            # Chains of masses, the smallest first: a larger structure takes a part of the delay for itself.
+            for c in sorted(filter(selection.is_chain, scores), key=lambda c: c.size):
+                work._behind(begin)
+                for _ in range(STEPS):
+                    step = delay_step(work.experiment, work.parts, c)[0]
+                    work._behind((work.delay or 0.0) + step)
+                    c = work.refined(c)
+                    if abs(step) * highest < SMALL:
+                        break
+                if not (work.delay or 0.0) > 0.0:
+                    continue
+                made.append((bic(c.cost / self.count, self.count, c.size + 1), work.delay or 0.0))
+                if made[-1][0] < less_than and not work.assessed(c).adequacy.falsified:
+                    return work.delay
+        least = min(made, default=(math.inf, 0.0))
+        return least[1] if least[0] < less_than else None
+
+    def noise_of(self, c: Candidate, in_part: bool = False) -> Autoregression:
+        """White: the errors are weighed."""
+        return Autoregression(np.zeros(0), math.sqrt(c.cost / self.count))
+
+    def scored(self, candidates: Sequence[Candidate], noise: Autoregression, in_part: bool = False) -> list[Candidate]:
+        """See `StructureSearch`."""
+        # What is less than a value's last digits is rounding, which no structure explains.
+        least = DIGITS**2 * sum(float(np.sum(np.abs(p.weight * p.value) ** 2)) for p in self.parts)
+        costs = [c.cost if c.cost > least else least for c in candidates]
+        return [
+            selection.charged(c, bic(cost / self.count, self.count, c.size)) for c, cost in zip(candidates, costs, strict=True)
+        ]
+
+    def assessed(self, c: Candidate) -> Assessed:
+        """See `StructureSearch`; deviations are those that are stated, or larger where what is left is."""
+        plain = self.experiment.fit_sums(c.fit, [], [], 0.0)[0]
+        if self.delay is not None:
+            plain = freed(self.experiment, self.parts, c, plain)
+        verdict = assessed_responses(self.parts, c.model, c.size + (self.delay is not None))
+        known = all(p.known for p in self.parts)
+        std = max(1.0, verdict.noise_std) if known else verdict.noise_std
+        return Assessed(c, c.cost, std, plain, plain, verdict)
+
+    def of_data(self, best: Assessed) -> dict[str, Any]:
+        """See `StructureSearch`; rmse is that of the relative error."""
+        model = best.candidate.model
+        errors = [p.errors(model) / p.weight for p in self.parts]
+        relative = np.concatenate([np.abs(e) / np.abs(p.value) for e, p in zip(errors, self.parts, strict=True)])
+        size = sum(float(np.sum(np.abs(p.weight * p.value) ** 2)) for p in self.parts)
+        return {
+            "rmse": float(np.sqrt(np.mean(relative**2))),
+            "fit_percent": PERCENT * (1.0 - math.sqrt(best.error_sum / size)),
+            "samples": 0,
+            "digests": (),
+            "initial_states": {},
+            "delay": None if self.delay is None else self.found_delay(best),
+            **told_of(self.responses),
+        }
+
+    def found_delay(self, best: Assessed) -> Estimate:
+        """The delay with its deviation."""
+        assert self.delay is not None
+        std = best.noise_std * delay_step(self.experiment, self.parts, best.candidate)[1]
+        return Estimate(self.delay, std, "s", False, bool(std < self.delay))
+
+    def notes(self) -> Sequence[str]:
+        """See `StructureSearch`."""
+        found: list[str] = [note for r in self.responses for note in r.notes]
+        if any(r.std is None for r in self.responses):
+            found.append(
+                "A response without standard deviations (std): how large its errors are is taken from what the model leaves, and "
+                "whether they are as large as they should be cannot be tested."
+            )
+        if self.delay is not None:
+            found.append(
+                say(
+                    f"The response is that of the axis behind a delay of {1e3 * self.delay:.4g} ms, of which nothing was said: "
+                    "the controller's computing, its bus and about the lag of its current loop."
+                )
+            )
+        return list(dict.fromkeys(found)) + compared_notes(self.responses)
+
+
+def compared_notes(responses: Sequence[FrequencyResponse]) -> list[Text]:
+    """What responses of one axis at several amplitudes say about its linearity: a hint, and no name.
+
+    The smallest amplitude is set beside the largest: |G| omega in the lowest third of the band that both have, and the
+    frequency of its peak.
+    """
+    told = sorted((r for r in responses if r.amplitude is not None), key=lambda r: r.amplitude or 0.0)
+    if len(told) < 2:
+        return []
+    small, large = told[0], told[-1]
+    low, high = max(small.omega[0], large.omega[0]), min(small.omega[-1], large.omega[-1])
+    if not high > low:
+        return []
+    curves = []
+    for r in (small, large):
+        inside = (r.omega >= low) & (r.omega <= high)
+        curves.append((r.omega[inside], (np.abs(r.velocity_response) * r.omega)[inside], r.relative_std[inside]))
+    if min(len(omega) for omega, _, _ in curves) < 3:  # no decision: a formula: a third of them is one at least
+        return []
+    gains, errors, peaks, spacing = [], [], [], []
+    for (omega, size, off), r in zip(curves, (small, large), strict=True):
+        part = len(omega) // 3  # no decision: which part the sentence speaks of
+        gains.append(float(np.median(size[:part])))
+        # A median's deviation is sqrt(pi/2) that of a mean.
+        stated = float(np.median(off[:part])) if r.std is not None else float(np.std(np.log(size[:part])))
+        errors.append(math.sqrt(0.5 * math.pi / part) * stated)
+        at = int(np.argmax(size))
+        peaks.append(float(omega[at]) / math.tau)
+        spacing.append(float(np.ptp(omega[max(0, at - 1) : at + 2])) / math.tau)
+    change, off_by = gains[1] / gains[0] - 1.0, POLICY.contradiction * math.hypot(*errors)
+    between = f"Not linear: with {{torque}} of {large.amplitude:.3g} instead of {small.amplitude:.3g} N m"
+    last = "Record a motion and diagnose it to know the cause."
+    found = []
+    if abs(change) > off_by:
+        way, why = ("larger", "dry friction or a dead band") if change > 0.0 else ("smaller", "a limit of the {torque}")
+        gain = f"the gain at low frequencies is {PERCENT * abs(change):.2g} % {way}"
+        found.append(say(f"{between} {gain}; {why} would do that. {last}"))
+    if abs(peaks[1] - peaks[0]) > max(spacing):
+        why = "a gap or a hardening coupling" if peaks[1] > peaks[0] else "friction in the coupling or a softening one"
+        moved = f"the peak moves from {peaks[0]:.4g} to {peaks[1]:.4g} Hz"
+        found.append(say(f"{between} {moved}; {why} would do that. {last}"))
+    return found

@@ -1,0 +1,191 @@
+"""identify() of measured frequency responses: structure, parameters and deviations right, alone and beside records.
+
+The responses are made here, of state-space models in SciPy and of formulas, and not by the library's simulation.
+"""
+
+from __future__ import annotations
+
+import io
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.linalg import expm
+
+import gaident as ga
+from gaident.errors import GaidentError, RecordError, SettingsError
+
+JM, DM, JL, DL, KG, DG = 2e-4, 1e-3, 3e-4, 1e-3, 12.0, 2e-3
+F = np.geomspace(5.0, 400.0, 60)
+
+
+def state_space() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Two masses; states: both velocities and the twist."""
+    A = np.array([[-(DM + DG) / JM, DG / JM, -KG / JM], [DG / JL, -(DL + DG) / JL, KG / JL], [1.0, -1.0, 0.0]])
+    return A, np.array([1.0 / JM, 0.0, 0.0]), np.array([1.0, 0.0, 0.0])
+
+
+def exact(f: np.ndarray = F, dt: float | None = None) -> np.ndarray:
+    """C (v - A)^-1 B: v = j omega, or e^(j omega dt) with what A and B become behind a hold."""
+    A, B, C = state_space()
+    variable = 2j * np.pi * f
+    if dt is not None:
+        block = np.zeros((4, 4))
+        block[:3, :3], block[:3, 3] = A, B
+        whole = expm(block * dt)
+        A, B, variable = whole[:3, :3], whole[:3, 3], np.exp(variable * dt)
+    return np.array([C @ np.linalg.solve(v * np.eye(3) - A, B) for v in variable])
+
+
+def noisy(g: np.ndarray, share: float, seed: int) -> np.ndarray:
+    """With complex errors in proportion to the magnitude."""
+    e = np.random.default_rng(seed).standard_normal((2, len(g)))
+    return g * (1.0 + share / np.sqrt(2.0) * (e[0] + 1j * e[1]))
+
+
+def within(idn: ga.Identification, deviations: float = 4.0) -> None:
+    """Every number of the mechanism, by its deviation."""
+    assert isinstance(idn.mechanics, ga.TwoMass)
+    found = idn.mechanics.with_shaft_damping
+    assert found is not None and (idn.p, idn.q) == (1, 2) and not idn.falsified
+    for name, truth in (("JM", JM), ("DM", DM), ("JL", JL), ("DL", DL), ("KG", KG), ("DG", DG)):
+        off = abs(getattr(found, name) - truth)
+        assert off < deviations * found.std[name], name
+        assert found.std[name] < 0.2 * truth, name
+
+
+@pytest.mark.parametrize("dt", [None, 1e-3])
+@pytest.mark.parametrize("stated", [True, False])
+def test_two_masses_from_one_response(dt: float | None, stated: bool) -> None:
+    g = noisy(exact(dt=dt), 0.01, 1)
+    idn = ga.identify(ga.FrequencyResponse(F, g, 0.01 * np.abs(g) if stated else None, dt=dt))
+    within(idn)
+    assert idn.of_responses and idn.frequencies == 60 and idn.samples == 0 and 0.005 < idn.rmse < 0.02
+    assert any("without standard deviations" in w for w in idn.warnings) != stated
+
+
+def test_kinds_of_response_are_one_model() -> None:
+    s = 2j * np.pi * F
+    for kind, g in (("torque to position", exact() / s), ("torque to acceleration", exact() * s)):
+        within(ga.identify(ga.FrequencyResponse(F, noisy(g, 0.01, 2), kind=kind)))
+
+
+def test_deviations_hold_over_many_responses() -> None:
+    """Of 95 % intervals, over 40 responses and six numbers each, 90 to 99 % contain the truth."""
+    inside = []
+    truth = np.array([JM, DM, JL, DL, KG, DG])
+    for seed in range(40):
+        g = noisy(exact(), 0.02, 100 + seed)
+        m = ga.identify(ga.FrequencyResponse(F, g, 0.02 * np.abs(exact()))).mechanics.with_shaft_damping
+        found = np.array([m.JM, m.DM, m.JL, m.DL, m.KG, m.DG])
+        inside.append(np.abs(found - truth) < 1.96 * np.array([m.std[n] for n in ("JM", "DM", "JL", "DL", "KG", "DG")]))
+    assert 0.90 < np.mean(inside) < 0.99
+
+
+def test_several_responses_count_together() -> None:
+    parts = [ga.FrequencyResponse(F, noisy(exact(), 0.02, s), 0.02 * np.abs(exact())) for s in (5, 6, 7, 8)]
+    one, all_four = ga.identify(parts[0]), ga.identify(parts)
+    within(all_four)
+    ratio = all_four.mechanics.std["J"] / one.mechanics.std["J"]
+    assert 0.4 < ratio < 0.6  # half, as of four times the data
+    assert ga.identify(parts[::-1]) == all_four  # the order is nobody's
+    with pytest.raises(RecordError, match="the same data"):
+        ga.identify([parts[0], parts[0]])
+
+
+def test_a_delay_in_the_path_is_found_and_taken_out() -> None:
+    late = 0.4e-3
+    g = noisy(exact() * np.exp(-2j * np.pi * F * late), 0.01, 9)
+    idn = ga.identify(ga.FrequencyResponse(F, g, 0.01 * np.abs(g)))
+    within(idn)
+    assert idn.delay is not None and abs(idn.delay.value - late) < 4.0 * idn.delay.std < 1e-5
+    assert any("behind a delay of 0.399" in w for w in idn.warnings)
+    again = ga.Identification.from_dict(idn.to_dict())
+    assert again == idn and again.delay == idn.delay
+
+
+def test_what_no_linear_model_has_is_falsified() -> None:
+    """A gain that falls in steps, as of a drive that saturates at some frequencies."""
+    g = noisy(exact(), 0.005, 10) * np.where(np.arange(60) // 7 % 2, 1.0, 0.85)
+    idn = ga.identify(ga.FrequencyResponse(F, g, 0.005 * np.abs(g)))
+    assert idn.falsified and "goes on from frequency to frequency" in idn.adequacy.sentence
+
+
+def drive_record(noise: float, seed: int) -> tuple[ga.Record, ga.PI]:
+    """A loop over the exact held plant, simulated here."""
+    A, B, _ = state_space()
+    dt, loop = 1e-3, ga.PI(kp=0.02, ki=0.4)
+    block = np.zeros((4, 4))
+    block[:3, :3], block[:3, 3] = A, B
+    whole = expm(block * dt)
+    rng = np.random.default_rng(seed)
+    command = np.repeat(rng.uniform(-20.0, 20.0, 10), 250)
+    x, stored, before = np.zeros(3), 0.0, 0.0
+    velocity, torque = np.zeros(len(command)), np.zeros(len(command))
+    for n, r in enumerate(command):
+        velocity[n] = x[0] + noise * rng.standard_normal()
+        e = r - velocity[n]
+        stored += 0.4 * dt * (e + before) / 2.0
+        before = e
+        torque[n] = 0.02 * e + stored
+        x = whole[:3, :3] @ x + whole[:3, 3] * torque[n]
+    return ga.Record(dt, command=command, velocity=velocity, torque=torque), loop
+
+
+def test_a_response_beside_a_record_sharpens_both() -> None:
+    rec, loop = drive_record(0.1, 11)
+    g = noisy(exact(dt=1e-3), 0.01, 12)
+    alone = ga.identify(rec, loop)
+    for std in (0.01 * np.abs(g), None):
+        both = ga.identify([rec, ga.FrequencyResponse(F, g, std, dt=1e-3)], loop)
+        within(both)
+        assert both.mechanics.std["JM"] < 0.5 * alone.mechanics.std["JM"]
+        assert both.samples == len(rec) and both.frequencies == 60 and not both.of_responses
+        assert np.sqrt(np.mean(both.residual(rec) ** 2)) == pytest.approx(0.1, rel=0.1)
+    assert "2500 samples of 1 record, 60 frequencies of 1 response" in both.summary()
+
+
+def test_a_response_of_another_axis_beside_a_record_falsifies() -> None:
+    rec, loop = drive_record(0.05, 13)
+    other = noisy(1.1 * exact(dt=1e-3), 0.01, 14)
+    assert ga.identify([rec, ga.FrequencyResponse(F, other, 0.01 * np.abs(other), dt=1e-3)], loop).falsified
+
+
+def test_responses_at_two_amplitudes_hint_at_what_is_not_linear() -> None:
+    peak = np.abs(exact() * F).argmax()
+    shifted = exact(F / 1.3) / 1.3  # of a shaft that is stiffer
+    small = ga.FrequencyResponse(F, noisy(0.8 * exact(), 0.01, 15), 0.01 * np.abs(exact()), amplitude=0.05)
+    large = ga.FrequencyResponse(F, noisy(shifted, 0.01, 16), 0.01 * np.abs(shifted), amplitude=0.5)
+    notes = [w for w in ga.identify([small, large]).warnings if w.startswith("Not linear")]
+    assert len(notes) == 2 and "larger; dry friction or a dead band" in notes[0]
+    assert f"{F[peak]:.4g}" in notes[1] and "a gap or a hardening coupling" in notes[1]
+    alike = ga.FrequencyResponse(F, noisy(exact(), 0.01, 17), 0.01 * np.abs(exact()), amplitude=0.05)
+    other = ga.FrequencyResponse(F, noisy(exact(), 0.01, 18), 0.01 * np.abs(exact()), amplitude=0.5)
+    assert not [w for w in ga.identify([alike, other]).warnings if w.startswith("Not linear")]
+
+
+def test_what_is_made_of_it(tmp_path: Path) -> None:
+    g = noisy(exact(), 0.02, 19)
+    fr = ga.FrequencyResponse(F, g, name="bode")
+    idn = ga.identify(fr)
+    assert "60 frequencies of 1 response" in idn.summary() and "rad/s, white part" not in idn.summary()
+    for figure in (idn.plot(), idn.plot_bode(), fr.plot("linear")):
+        figure.savefig(io.BytesIO())
+    idn.save(f"{tmp_path}/i.json")
+    again = ga.load(f"{tmp_path}/i.json")
+    assert again == idn and again.responses == () and again.response_digests == (fr.digest,)
+    ga.report(idn, f"{tmp_path}/r.html")
+    page = Path(f"{tmp_path}/r.html").read_text(encoding="utf-8")
+    assert "explains the frequency response" in page and fr.digest in page
+
+
+def test_wrong_use() -> None:
+    fr = ga.FrequencyResponse(F, exact())
+    with pytest.raises(SettingsError, match="controller is PI"):
+        ga.identify(fr, ga.PI(0.02, 0.4))
+    with pytest.raises(RecordError, match="rec is list"):
+        ga.identify([fr, "bode.csv"])  # type: ignore[list-item]
+    with pytest.raises(GaidentError, match="arithmetic"):
+        ga.identify(fr, settings=ga.Settings(arithmetic="c30"))
+    with pytest.raises(RecordError, match="rec is FrequencyResponse"):
+        ga.diagnose(fr)  # type: ignore[arg-type]
