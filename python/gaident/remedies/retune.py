@@ -17,14 +17,12 @@ from gaident.control.controller import Controller, checked_controller
 from gaident.control.differencing import older
 from gaident.control.filters import Filter, LowPass, Notch
 from gaident.control.pi import PI
-from gaident.data.signals.difference import is_difference_of_lines
 from gaident.errors import SettingsError
-from gaident.models.drive_torque import HALF
 from gaident.models.effects_linear import LATE
 from gaident.models.model import Model
 from gaident.policy.table import POLICY
 from gaident.remedies.doubts import doubts_of, no_gains
-from gaident.remedies.draws import drawn_models
+from gaident.remedies.draws import age_of, drawn_models, path_delay_of
 from gaident.remedies.figures import Judge
 from gaident.remedies.loops import Loops, frequencies_of
 from gaident.remedies.nonlinear import simulated_with, without_each
@@ -37,7 +35,7 @@ from gaident.results.identification import Identification
 from gaident.results.retuning import Retuning, RuleStart
 from gaident.version import version
 
-__all__ = ["age_of", "retune"]
+__all__ = ["retune"]
 
 AS_GIVEN = "the given gains"
 NO_FILTER = "A PI has no filter: where the drive can have one, give a Cascade around the PI as controller."
@@ -139,7 +137,8 @@ def retune(
             f"the model of the result has gain {linear[0].gain:g} and p = {linear[0].p}: gains are proposed for a drive that a "
             "positive torque turns forwards, with more poles than zeros; change the sign of the torque, or identify again"
         )
-    plants = sampled_plants(linear, period, given.delay, age > 0.0)
+    path_delay = path_delay_of(result)
+    plants = sampled_plants(linear, period, given.delay + path_delay, age > 0.0)
     work = _Retuning(
         linear[0], given, period, age > 0.0, Search(plants.chosen(slice(0, POLICY.tuned_drives + 1)), asked.roomier())
     )
@@ -181,6 +180,7 @@ def retune(
         model=result.model,
         period=period,
         velocity_age=age,
+        path_delay=path_delay,
         noise=asked.noise,
         seed=seed,
         axis=axis,
@@ -378,15 +378,6 @@ def _asked(
         numbers.get("torque_noise"),
         _noise_of(result),
     )
-
-
-def age_of(result: Identification | Diagnosis, given: Controller) -> float:
-    """Lines of the log by which the velocity is old: as diagnosed, else half a sample where it is the positions' difference."""
-    if isinstance(result, Diagnosis):
-        return result.velocity_age
-    pairs = [(r, r.position) for r in result.records]
-    made = pairs and all(q is not None and is_difference_of_lines(r.velocity, q, r.dt) for r, q in pairs)
-    return HALF / given.log_every(result.records[0].dt) if made else 0.0
 
 
 def _step_of(result: Identification | Diagnosis) -> float:

@@ -177,6 +177,8 @@ class Retuning(SavedResult):
         Sample time of the controller [s].
     velocity_age : float
         See `Diagnosis.velocity_age`.
+    path_delay : float
+        Delay that frequency responses show beside the model [s].
     noise : float
         Standard deviation of the measured velocity's noise [rad/s].
     seed : int
@@ -205,7 +207,6 @@ class Retuning(SavedResult):
     phase_margin: float
     gain_margin: float
     torque_limit: float | None
-    torque_noise: float | None
     step: float
     holds: float
     drives: int
@@ -220,6 +221,8 @@ class Retuning(SavedResult):
     noise: float
     seed: int
     axis: str = "rotary"
+    path_delay: float = 0.0
+    torque_noise: float | None = None
     digests: tuple[str, ...] = ()
     version: str = ""
     records: tuple[()] = field(default=(), compare=False, repr=False)
@@ -302,11 +305,10 @@ class Retuning(SavedResult):
                 model=Model.from_dict(data["model"]),
                 digests=tuple(data["digests"]),
                 version=data["gaident_version"],
-                **{name: data[name] for name in (*ASKED, *FOUND) if name != "torque_noise"},
-                torque_noise=data.get("torque_noise"),  # files of before have none
+                **{name: data[name] for name in (*ASKED, *FOUND) if name in data},
                 **said,
             )
 
 
 ASKED = ("phase_margin", "gain_margin", "torque_limit", "torque_noise", "step", "seed")
-FOUND = ("holds", "drives", "rule", "period", "velocity_age", "noise", "axis")
+FOUND = ("holds", "drives", "rule", "period", "velocity_age", "noise", "axis", "path_delay")
