@@ -55,9 +55,10 @@ def _curves(result: Retuning, name: str, controller: Controller) -> LoopCurves:
     if not loops.stable.all():
         return LoopCurves(name, hertz[seen], L[seen], None, None)
     velocity, _, dt = loops.step()
-    time = dt * np.arange(velocity.shape[1], dtype=np.float64)
-    short = time <= _shown_time(result)
-    return LoopCurves(name, hertz[seen], L[seen], time[short], velocity[0, short])
+    time, end = dt * np.arange(velocity.shape[1], dtype=np.float64), _shown_time(result)
+    short = time <= end
+    answer = velocity[0, short]  # at rest from its end on
+    return LoopCurves(name, hertz[seen], L[seen], np.append(time[short], end), np.append(answer, answer[-1]))
 
 
 def plot_retuning(result: Retuning, axis: str = "rotary") -> Figure:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -27,15 +28,23 @@ def remedies_section(view: View, drawn: Charts) -> Section:
     if do is None:
         missing = "Other gains, feedforward and what a repair brings need the record."
         return Section("remedies", "What to do", needs_record(view, missing))
-    doubts = tag("p", tag("b", "Do not act on this chapter before this is settled."))
     return Section(
         "remedies",
         "What to do",
-        box(doubts, sentences(do.doubts, axis), kind="warn") if do.doubts else "",
+        _doubts(do.doubts, axis),
         _gains(do, axis, drawn),
         _feedforward(do, axis),
         _mended(do, axis),
     )
+
+
+def _doubts(doubts: Sequence[str], axis: str) -> Html:
+    """The first line says it, then what else there is."""
+    if not doubts:
+        return Html()
+    first, *others = doubts
+    end = tag("p", "Do not act on this chapter before that is settled.")
+    return box(tag("p", tag("b", typeset(said(first, axis)))), sentences(others, axis), end, kind="warn")
 
 
 def _reason(what: str, why: str, axis: str) -> Html:
