@@ -6,8 +6,7 @@ import argparse
 from typing import TYPE_CHECKING
 
 from gaident.cli.log_options import number
-from gaident.data.frequency.read_response import COLUMNS, UNITS, read_response
-from gaident.data.frequency.response import KINDS
+from gaident.data.frequency.columns import COLUMNS, KINDS, UNITS
 from gaident.errors import SettingsError
 
 if TYPE_CHECKING:
@@ -26,7 +25,7 @@ def add_response_options(parser: argparse.ArgumentParser) -> None:
     g.add_argument(
         "--response-columns", action="append", default=[], metavar="NAME=COLUMN,...", help=f"of {names} (default: by name)"
     )
-    units = "; ".join(f"{key} {', '.join(known)}" for key, known in UNITS.items())
+    units = "; ".join(f"{key} {', '.join(known)}" for key, known in UNITS.items()).replace("%", "%%")  # of argparse
     g.add_argument("--response-units", action="append", default=[], metavar="NAME=UNIT,...", help=units)
     g.add_argument("--response-kind", choices=list(KINDS), default="torque to velocity", help="what was measured")
     g.add_argument("--response-dt", type=number, metavar="S", help="sample time of a drive that measured it [s]")
@@ -35,6 +34,8 @@ def add_response_options(parser: argparse.ArgumentParser) -> None:
 
 def responses_of(args: argparse.Namespace) -> list[FrequencyResponse]:
     """Those that the options name."""
+    from gaident.data.frequency.read_response import read_response
+
     columns = _assignments(args.response_columns, "--response-columns", list(COLUMNS))
     units = _assignments(args.response_units, "--response-units", list(UNITS))
     return [

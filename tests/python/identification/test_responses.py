@@ -13,7 +13,7 @@ import pytest
 from scipy.linalg import expm
 
 import gaident as ga
-from gaident.errors import GaidentError, RecordError, SettingsError
+from gaident.errors import GaidentError, RecordError, SettingsError, SpaceError
 
 JM, DM, JL, DL, KG, DG = 2e-4, 1e-3, 3e-4, 1e-3, 12.0, 2e-3
 F = np.geomspace(5.0, 400.0, 60)
@@ -174,9 +174,16 @@ def test_what_is_made_of_it(tmp_path: Path) -> None:
     idn.save(f"{tmp_path}/i.json")
     again = ga.load(f"{tmp_path}/i.json")
     assert again == idn and again.responses == () and again.response_digests == (fr.digest,)
-    ga.report(idn, f"{tmp_path}/r.html")
+    ga.report(idn, f"{tmp_path}/r.html", live=False)
     page = Path(f"{tmp_path}/r.html").read_text(encoding="utf-8")
     assert "explains the frequency response" in page and fr.digest in page
+
+
+@pytest.mark.parametrize(("turn", "remedy"), [(np.negative, "give -response"), (np.conj, r"numpy\.conj")])
+def test_a_response_of_another_sign_is_refused_with_the_remedy(turn: np.ufunc, remedy: str) -> None:
+    g = noisy(exact(), 0.01, 20)
+    with pytest.raises(SpaceError, match=remedy):
+        ga.identify(ga.FrequencyResponse(F, turn(g), 0.01 * np.abs(g)))
 
 
 def test_wrong_use() -> None:

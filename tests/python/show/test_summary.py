@@ -36,6 +36,9 @@ class Fake:
     seed: int = 7
     version: str = "0.1.0"
     digests: tuple[str, ...] = ("c0ffee",)
+    frequencies: int = 0
+    response_digests: tuple[str, ...] = ()
+    of_responses: bool = False
     controller: Any = field(default_factory=lambda: ga.PI(0.0232, 1.367, torque_limit=2.4))
     adequacy: Any = field(
         default_factory=lambda: SimpleNamespace(noise_std=0.3011, undecided=False, sentence="The residual is white.")

@@ -15,32 +15,13 @@ from gaident.arguments import arg
 from gaident.checks import above_zero, checked_path, known_keys
 from gaident.data.formats.delimited import TextOptions, open_text
 from gaident.data.formats.table import Column, LogTable
+from gaident.data.frequency.columns import COLUMNS, UNITS
 from gaident.data.frequency.response import FrequencyResponse
 from gaident.errors import ReadError
 
-__all__ = ["COLUMNS", "UNITS", "read_response"]
+__all__ = ["read_response"]
 
 Vector = NDArray[np.float64]
-
-COLUMNS = {
-    "frequency": r"f|freq\w*|fr[eé]q\w*|frec\w*|omega|w",
-    "magnitude": r"mag\w*|amplitud\w*|gain|betrag|verst\w*|modul\w*|abs|\|?[gh]\|?|\|[gh]\(.*\)\||ampl\w*",
-    "phase": r"phas\w*|fase|arg(\(.*\))?|angle|winkel",
-    "real": r"re|real\w*|re\(.*\)",
-    "imaginary": r"im|imag\w*|im\(.*\)",
-    "coherence": r"coh\w*|koh\w*|gamma\w*",
-    "std": r"std|sigma|stddev",
-}
-"""What a column's first word is, for each quantity."""
-
-_DEGREE = math.pi / 180.0  # no decision: a unit; rad
-UNITS: dict[str, dict[str, float]] = {
-    "frequency": {"hz": 1.0, "khz": 1e3, "rad/s": 0.5 / math.pi},  # no decision: a unit
-    "magnitude": {"db": math.nan, "1": 1.0},
-    "phase": {"deg": _DEGREE, "°": _DEGREE, "grad": _DEGREE, "rad": 1.0},
-    "coherence": {"1": 1.0, "%": 0.01},  # no decision: a unit
-}
-"""Factor to Hz, 1, rad and 1; nan: decibels."""
 
 _UNIT = re.compile(r"(.*?)[\s/_]*[\[(<{/_ ]\s*(khz|hz|rad/s|db|deg|grad|°|rad|%|1)\s*[\])>}]?", re.IGNORECASE)
 

@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from gaident.arguments import arg
 from gaident.checks import one_of
+from gaident.data.frequency.columns import KINDS
 from gaident.data.record_checks import readable, texts
 from gaident.data.signals.arrays import positive_number, sample_time
 from gaident.errors import RecordError
@@ -20,13 +21,11 @@ from gaident.providers import picture
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-__all__ = ["KINDS", "FrequencyResponse"]
+__all__ = ["FrequencyResponse"]
 
 Vector = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
-KINDS = {"torque to velocity": 0, "torque to position": 1, "torque to acceleration": -1}
-"""Kinds of response, and how often they are differentiated in time to be one of the velocity."""
 LEAST = 8  # no decision: what an argument may be: a response has so many frequencies at least
 LARGEST = 1e30  # no decision: what an argument may be: a size whose square is still a number
 

@@ -43,6 +43,7 @@ CAUSES: tuple[Cause, ...] = (
         "velocity_observer", "sensor", "bandwidth", lambda s: 0.06 / s.log_dt, lambda s: 40.0 / s.log_dt,
         lambda s: tuple(np.geomspace(0.12, 6.0, 6) / s.log_dt),
         seen_angle=_behind_observer,
+        late=True,
         excludes=OTHERS["velocity_observer"],
         needs=(t.moves, t.every_sample, t.torque_logged),
         excited_by=("random signal at speed",),

@@ -127,10 +127,10 @@ class ModelSpace:
 
     def score(self, fit: Fit) -> float:
         """BIC and the penalties of the effects; the lower the better."""
-        # The penalty is for the number of candidates tried: an effect that the records show without a model costs one less.
-        effects = sum(_depth(t) - (t.family in self.shown) for t in fit.parameters.terms)
-        searched = sum(t.search_cost for t in fit.parameters.terms)
-        more = fit.parameters.masses - 1 + fit.parameters.on_a_spring  # a second mass, or a spring, counts as an effect
+        # The penalty is for candidates tried: what records show without a model, or a spring's tension at first, costs one less.
+        made, spring = fit.parameters, fit.parameters.on_a_spring
+        effects = sum(_depth(t) - (t.family in self.shown or (spring and LIBRARY[t.name].constant)) for t in made.terms)
+        searched, more = sum(t.search_cost for t in made.terms), made.masses - 1 + spring  # a second mass or a spring is one, too
         return fit.bic + self.penalty * (effects + more) + searched
 
     def key(self, fit: Fit) -> Hashable:

@@ -14,7 +14,7 @@ from gaident import _core
 from gaident.axis import Text, say
 from gaident.control import core
 from gaident.data.frequency.response import FrequencyResponse
-from gaident.errors import RecordError, SettingsError
+from gaident.errors import RecordError, SettingsError, SpaceError
 from gaident.estimation.criterion import bic
 from gaident.identification import selection
 from gaident.identification.noise import Autoregression
@@ -106,10 +106,28 @@ class ResponseSearch(StructureSearch):
         # A chain behind a delay is smaller than what makes up for one: it wins within the margin, as the smallest does.
         delay = self._best_delay(min(c.bic for c in scores) + POLICY.rival_margin)
         if delay is None:
+            self._refuse_other_signs()
             return best, scores
         self._behind(delay)
         found[:] = super().search(*self.runs, None)
         return super().select(found)
+
+    def _refuse_other_signs(self) -> None:
+        """Raises SpaceError where a chain of masses holds once the response's sign, or that of its phase, is another one."""
+        held: list[tuple[float, str]] = []
+        for turned, what in (
+            (np.negative, "has the opposite sign: the velocity falls where the torque rises; give -response"),
+            (np.conj, "counts its phase the other way: a lag is positive in it; give the conjugate, numpy.conj(response)"),
+        ):
+            made = [
+                FrequencyResponse(r.frequency_hz, turned(r.response), r.std, r.coherence, r.kind, dt=r.dt) for r in self.responses
+            ]
+            work = ResponseSearch(made, self.space, self.settings, self.workers)
+            best = super(ResponseSearch, work).select(work.search(*self.runs, None))[0]
+            if selection.is_chain(best.candidate) and not best.adequacy.falsified:
+                held.append((best.candidate.cost, what))
+        if held:
+            raise SpaceError(f"the response {min(held)[1]}")
 
     def _best_delay(self, less_than: float) -> float | None:
         """The delay [s] of the first chain of masses that holds behind one, else of the least BIC; None: none below that."""
