@@ -41,6 +41,7 @@ provide(
         "diagnosis_html": "gaident.show.report.notebook:diagnosis_html",
         "diagnosis_table": "gaident.export.tables:diagnosis_table",
         "plot_diagnosis": "gaident.reporting.figures:plot_diagnosis",
+        "run_as_seen": "gaident.estimation.mean_velocity:run_as_seen",
         # InverseDynamics
         "regression_torque": "gaident.estimation.regression.prediction:regression_torque",
         "regression_error": "gaident.estimation.regression.prediction:regression_error",

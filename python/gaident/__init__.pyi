@@ -17,6 +17,7 @@ from .data import (
 from .diagnosis import diagnose, first_experiment
 from .errors import GaidentError
 from .estimation import ForceError, WindingFit, estimate_winding, force_error, inverse_dynamics
+from .export import to_fmu
 from .fleets import Fleet, Trends, fleet, trends
 from .identification import LeastSquares, frequency_response, identify, least_squares, m_sequence
 from .models import (
@@ -64,6 +65,7 @@ from .results import (
     load,
 )
 from .show import progress
+from .simulators import JointParameters, joint_parameters
 
 __all__ = [
     "PI",
@@ -83,6 +85,7 @@ __all__ = [
     "GaidentError",
     "Identification",
     "InverseDynamics",
+    "JointParameters",
     "LeastSquares",
     "Limits",
     "LoopFigures",
@@ -123,6 +126,7 @@ __all__ = [
     "identify",
     "initial_state",
     "inverse_dynamics",
+    "joint_parameters",
     "least_squares",
     "load",
     "m_sequence",
@@ -139,6 +143,7 @@ __all__ = [
     "run",
     "simulate",
     "simulate_many",
+    "to_fmu",
     "trends",
 ]
 

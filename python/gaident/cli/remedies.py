@@ -28,6 +28,7 @@ SAME_NAME = {
         "gain_margin",
         "torque_noise",
         "speed",
+        "compiler",
     ),
 }
 _OTHER_NAME = {"start": "from", "stop": "to"}
@@ -36,6 +37,7 @@ WHOLE = {
     ("controller", "PI(...)"): "--kp and --ki",
     ("controller", "PI(kp=..., ki=...)"): "--kp and --ki",
     ("loop", "'continuous'"): "--loop continuous",
+    ("binary", "False"): "--sources",
 }
 
 

@@ -11,7 +11,7 @@ from gaident import _core
 from gaident.control.cascade import Cascade, cascade_of
 from gaident.control.controller import Controller
 
-__all__ = ["DifferencingCascade", "differencing"]
+__all__ = ["DifferencingCascade", "differencing", "older"]
 
 
 @dataclass(frozen=True)
@@ -27,3 +27,8 @@ def differencing(controller: Controller) -> DifferencingCascade:
     """The same controller around a differenced angle."""
     cascade = cascade_of(controller)
     return DifferencingCascade(**{f.name: getattr(cascade, f.name) for f in fields(Cascade)})
+
+
+def older(controller: Controller, lines: float) -> Controller:
+    """The same controller around a velocity that is so many lines of the log old: above 0 it is the differenced angle."""
+    return differencing(controller) if lines > 0.0 else controller

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from gaident.axis import TURN, period_of
 from gaident.control.controller import Controller
-from gaident.control.differencing import differencing
+from gaident.control.differencing import older
 from gaident.control.filtering import filtered
 from gaident.control.found import FoundNumbers
 from gaident.control.pi import PI, bare_pi
@@ -26,8 +26,8 @@ from gaident.data.torque_kind import MEASURED
 from gaident.estimation.mean_velocity import means, with_middles
 from gaident.estimation.period import period_of_place
 from gaident.estimation.term import Term, limiting_of
-from gaident.models.drive_torque import torque_of
-from gaident.models.made_torque import late, stored_torque
+from gaident.models.drive_torque import as_late, torque_of
+from gaident.models.made_torque import stored_torque
 from gaident.models.simulate_many import LoadedRecord
 from gaident.models.simulation_input import followed
 from gaident.models.starts import noise_std, starts_moving
@@ -119,17 +119,14 @@ class DataSet:
 
     def older(self, loop: Controller | None) -> Controller | None:
         """A loop in which the velocity has its age: it is the difference of the angle over a sample of the controller."""
-        return loop if loop is None or not self.age > 0.0 else differencing(loop)
+        return None if loop is None else older(loop, self.age)
 
     def as_old(self, rec: Record) -> Record:
         """A record whose torque is as late as the velocity is old: a linear model that it drives gives the velocity that is seen.
 
         That is the mean of the velocities at the ends of a line; `gaident.estimation.mean_velocity` has what is nearer.
         """
-        if not self.age or rec.torque is None:
-            return rec
-        start = rec.torque[0] if starts_moving(rec, None) else 0.0
-        return rec.with_channels(torque=late(rec.torque, self.age, start))
+        return as_late(rec, self.age)
 
     def ready(self, rec: Record, at: int) -> Record:
         """A record whose simulation `seen` takes for the velocity that the sensor shows; at: its place among the records."""

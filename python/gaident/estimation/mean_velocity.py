@@ -9,16 +9,22 @@ large as the steps of a fine encoder.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import lru_cache
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from gaident.control.controller import Controller
+from gaident.control.differencing import older
 from gaident.data.record import Record
+from gaident.models.drive_torque import HALF, as_late
 from gaident.models.held_torque import kind_of_held, sampled_between
+from gaident.models.simulate import Run, run, simulate
+from gaident.models.simulation_input import AnyModel
 
-__all__ = ["means", "with_middles"]
+__all__ = ["means", "run_as_seen", "with_middles"]
 
 Matrix = NDArray[np.float64]
 
@@ -46,3 +52,14 @@ def means(W: Matrix) -> Matrix:
     seen = ends.copy()
     seen[:, 1:] = (ends[:, :-1] + 4.0 * middles[:, :-1] + ends[:, 1:]) / 6.0  # no decision: a formula: Simpson's rule
     return seen
+
+
+def run_as_seen(model: AnyModel, rec: Record, controller: Controller | None, lines: float) -> Run:
+    """A model's run from rest, its velocity so many lines of the log old, as that of the record is against its torque.
+
+    In a loop the controller reads that velocity; else it is the one that the sensor shows of a motion which it does not change.
+    """
+    if controller is not None:
+        return run(model, rec, older(controller, lines))
+    velocity = means(simulate(model, with_middles(rec))[None])[0] if lines == HALF else simulate(model, as_late(rec, lines))
+    return replace(run(model, rec), velocity=velocity)

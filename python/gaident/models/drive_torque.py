@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,7 +22,9 @@ from gaident.models.starts import starts_moving
 
 __all__ = [
     "HALF",
+    "as_late",
     "as_old_as_its_velocity",
+    "as_read",
     "driven_by",
     "made_by",
     "on_lines",
@@ -134,6 +136,15 @@ def as_differenced(rec: Record, controller: Controller | None) -> Record:
     return rec.with_channels(velocity=difference_at_clock(rec.position, rec.dt, every))
 
 
+def as_read(rec: Record, controller: Controller | None, shifts: Mapping[str, Mapping[str, int]]) -> Record:
+    """The record with the velocity that its controller reads, and its channels on the same lines.
+
+    shifts: digest of a record -> channel -> samples by which it is moved, see `Diagnosis.log_shifts`.
+    """
+    rec = on_lines(as_differenced(rec, controller), controller)
+    return rec.shifted(**moves) if (moves := shifts.get(rec.digest)) else rec
+
+
 def without_age(rec: Record) -> Record:
     """The record with the difference over two lines, which has no age, where its velocity is a difference of lines."""
     if rec.position is None or not is_difference_of_lines(rec.velocity, rec.position, rec.dt):
@@ -150,8 +161,15 @@ def as_old_as_its_velocity(rec: Record, every: int) -> Record:
     """
     if rec.torque is None or not is_difference_at_clock(rec.velocity, rec.position, rec.dt, every):
         return rec
+    return as_late(rec, HALF / every)
+
+
+def as_late(rec: Record, lines: float) -> Record:
+    """The record with its torque so many lines of the log later [1], or earlier: as its velocity is older, or younger."""
+    if not lines or rec.torque is None:
+        return rec
     before = rec.torque[0] if starts_moving(rec, None) else 0.0
-    return rec.with_channels(torque=late(rec.torque, HALF / every, before))
+    return rec.with_channels(torque=late(rec.torque, lines, before))
 
 
 def made_by(rec: Record, controller: Controller) -> Vector:

@@ -54,8 +54,7 @@ TEXT = """\
 
 static const double {name}_velocity[{count}] = {{{velocity}}};
 static const double {name}_friction[{count}] = {{{friction}}};
-static const double {name}_waves[{rows}][3] = {{{waves}}}; /* order, sine, cosine */
-
+{waves}
 double {name}(double velocity, double angle, double acceleration);
 
 double {name}(double velocity, double angle, double acceleration)
@@ -69,13 +68,19 @@ double {name}(double velocity, double angle, double acceleration)
         while (velocity > w[i + 1]) ++i;
         torque += f[i] + (f[i + 1] - f[i]) * (velocity - w[i]) / (w[i + 1] - w[i]);
     }}
-    for (i = 0; i < {count_of_waves}; ++i) {{
-        const double x = {name}_waves[i][0] * angle;
-        torque += {name}_waves[i][1] * sin(x) + {name}_waves[i][2] * cos(x);
-    }}
+{of_angle}
     return torque;
 }}
 """
+WAVES = """\
+static const double {name}_waves[{count}][3] = {{{waves}}}; /* order, sine, cosine */
+"""
+OF_ANGLE = """\
+    for (i = 0; i < {count}; ++i) {{
+        const double x = {name}_waves[i][0] * angle;
+        torque += {name}_waves[i][1] * sin(x) + {name}_waves[i][2] * cos(x);
+    }}"""
+NO_ANGLE = "    (void)angle; /* nothing depends on it */"
 
 
 def c_tables(tables: _Numbers, name: str) -> str:
@@ -83,7 +88,8 @@ def c_tables(tables: _Numbers, name: str) -> str:
     axis, middle = tables.axis, len(tables.velocity) // 2
     velocity = np.concatenate([tables.velocity[:middle], [0.0], tables.velocity[middle:]])
     friction = np.concatenate([tables.friction[:middle], [0.0], tables.friction[middle:]])
-    waves = [f"{{{_list((w.order, w.sine, w.cosine))}}}" for w in tables.waves] or ["{0.0, 0.0, 0.0}"]
+    waves = [f"{{{_list((w.order, w.sine, w.cosine))}}}" for w in tables.waves]
+    listed = {"name": name, "count": len(waves), "waves": ", ".join(waves)}
     return TEXT.format(
         title=said(say("{Torque} of friction, load and {inertia}"), axis),
         name=name,
@@ -96,9 +102,8 @@ def c_tables(tables: _Numbers, name: str) -> str:
         last=len(velocity) - 1,
         velocity=_list(velocity),
         friction=_list(friction),
-        waves=", ".join(waves),
-        rows=len(waves),
-        count_of_waves=len(tables.waves),
+        waves=WAVES.format(**listed) if waves else "",
+        of_angle=OF_ANGLE.format(**listed) if waves else NO_ANGLE,
         constant=repr(float(tables.constant)),
         viscous=repr(float(tables.viscous)),
         of_slope=repr(float(tables.inertia)),

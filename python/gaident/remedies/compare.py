@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -12,11 +13,13 @@ from numpy.typing import NDArray
 from gaident.axis import said, say, unit
 from gaident.control.controller import Controller, checked_controller
 from gaident.data.record import Record
+from gaident.data.signals.difference import is_difference_at_clock
 from gaident.errors import GaidentError, SettingsError
+from gaident.estimation.mean_velocity import run_as_seen
 from gaident.estimation.regression.force_error import force_error
+from gaident.models.drive_torque import HALF, as_late, as_read
 from gaident.models.mechanics import OneMass, TwoMass
 from gaident.models.model import Model
-from gaident.models.simulate import simulate
 from gaident.models.simulation_input import as_model
 from gaident.results.diagnosis import Diagnosis
 from gaident.results.identification import Identification
@@ -98,6 +101,9 @@ def compare(
 ) -> ModelComparison:
     """Simulate several models on the same records, and say how far each is off.
 
+    The records are as the first Diagnosis among the models used them, with its shifts of the log and its age of the velocity.
+    Without one a velocity is half a sample of the controller old where it is the difference of the logged positions.
+
     Parameters
     ----------
     models : mapping of str to model, or sequence of models
@@ -138,9 +144,8 @@ def compare(
         raise SettingsError(f"rec is {type(rec).__name__}: give a gaident.Record or a list of them")
     if not named:
         raise SettingsError("models is empty: give one model at least")
-    measured = np.concatenate([r.velocity for r in records])
-    spread = float(np.linalg.norm(np.concatenate([r.velocity - np.mean(r.velocity) for r in records])))
-    return ModelComparison(tuple(_compared(str(n), m, records, controller, measured, spread) for n, m in named.items()))
+    data = _taken(list(named.values()), records, controller)
+    return ModelComparison(tuple(_compared(str(n), m, data) for n, m in named.items()))
 
 
 def _listed(models: object) -> Sequence[Given]:
@@ -149,20 +154,54 @@ def _listed(models: object) -> Sequence[Given]:
     return models
 
 
-def _compared(
-    name: str, given: Given, records: Sequence[Record], controller: Controller | None, measured: Vector, spread: float
-) -> ComparedModel:
+@dataclass(frozen=True, eq=False)
+class _Taken:
+    """The records as they are compared, and the loop; age: of their velocity against their torque [lines of the log]."""
+
+    records: tuple[Record, ...]
+    controller: Controller | None
+    age: float
+
+    @cached_property
+    def spread(self) -> float:
+        """Norm of the velocity less its mean in each record [rad/s]."""
+        return float(np.linalg.norm(np.concatenate([r.velocity - np.mean(r.velocity) for r in self.records])))
+
+    def error(self, model: Model) -> Vector:
+        """Measured minus simulated velocity of all records [rad/s]."""
+        runs = [run_as_seen(model, r, self.controller, self.age) for r in self.records]
+        return np.concatenate([r.velocity - one.velocity for r, one in zip(self.records, runs, strict=True)])
+
+    @property
+    def led(self) -> list[Record]:
+        """As their motion is that of their torque, which is as late as the velocity is old; a logged position has no age."""
+        return [r if r.position is not None else as_late(r, self.age) for r in self.records]
+
+
+def _taken(given: Sequence[Given], records: Sequence[Record], controller: Controller | None) -> _Taken:
+    for dia in given:
+        if isinstance(dia, Diagnosis):
+            if controller is None:
+                return _Taken(tuple(map(dia.as_used, records)), None, dia.velocity_age)
+            return _Taken(tuple(as_read(r, controller, dia.log_shifts) for r in records), controller, dia.velocity_age)
+    used = tuple(as_read(r, controller, {}) for r in records)
+    every = [1 if controller is None else controller.log_every(r.dt) for r in used]
+    made = all(is_difference_at_clock(r.velocity, r.position, r.dt, k) for r, k in zip(used, every, strict=True))
+    return _Taken(used, controller, HALF / max(every) if made else 0.0)
+
+
+def _compared(name: str, given: Given, data: _Taken) -> ComparedModel:
     model = given.model if isinstance(given, Identification | Diagnosis) else as_model(given)
     with np.errstate(over="ignore", invalid="ignore"):
-        error = measured - np.concatenate([simulate(model, r, controller) for r in records])
+        error = data.error(model)
         size, largest = float(np.linalg.norm(error)), float(np.max(np.abs(error)))
     if not np.isfinite(size):
         return ComparedModel(name, float("inf"), float("-inf"), float("inf"), None)
     force = None
-    if all(r.torque is not None for r in records):
+    if all(r.torque is not None for r in data.records):
         try:
-            force = force_error(model, list(records)).rms
+            force = force_error(model, data.led).rms
         except GaidentError:  # the model has no torque of a motion, or nothing moves
             force = None
-    fit = 100.0 * (1.0 - size / spread) if spread > 0.0 else float("nan")
+    fit = 100.0 * (1.0 - size / data.spread) if data.spread > 0.0 else float("nan")
     return ComparedModel(name, size / float(np.sqrt(len(error))), fit, largest, force)

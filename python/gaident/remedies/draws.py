@@ -1,17 +1,20 @@
-"""Drives drawn from what the records leave open: models whose parameters have the covariance of a result."""
+"""What a result leaves possible: drives drawn from its covariance, and how late its velocity is."""
 
 from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
 
+from gaident.control.controller import Controller
+from gaident.data.signals.difference import is_difference_of_lines
 from gaident.errors import ModelError
+from gaident.models.drive_torque import HALF
 from gaident.models.factors import model_numbers, model_of_numbers
 from gaident.models.model import Model
 from gaident.results.diagnosis import Diagnosis
 from gaident.results.identification import Identification
 
-__all__ = ["drawn_models"]
+__all__ = ["age_of", "drawn_models", "path_delay_of"]
 
 TRIES = 20  # no decision: of a solver: draws for each drive, of which some are no drives
 
@@ -53,3 +56,18 @@ def _made(values: NDArray[np.float64], like: Model) -> Model | None:
 def _alike(made: Model, like: Model) -> bool:
     pairs = [[sum(r.imag > 0.0 for r in roots) for roots in (m.poles, m.zeros)] for m in (made, like)]
     return pairs[0] == pairs[1]
+
+
+def age_of(result: Identification | Diagnosis, given: Controller) -> float:
+    """Lines of the log by which the velocity is old: as diagnosed, else half a sample where it is the positions' difference."""
+    if isinstance(result, Diagnosis):
+        return result.velocity_age
+    pairs = [(r, r.position) for r in result.records]
+    made = pairs and all(q is not None and is_difference_of_lines(r.velocity, q, r.dt) for r, q in pairs)
+    return HALF / given.log_every(result.records[0].dt) if made else 0.0
+
+
+def path_delay_of(result: Identification | Diagnosis) -> float:
+    """A delay [s] that frequency responses show beside the model: it is in the loop, too."""
+    delay = None if isinstance(result, Diagnosis) else result.delay
+    return 0.0 if delay is None else max(delay.value, 0.0)

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gaident.axis import said, say, unit
+from gaident.axis import checked_axis, said, say, unit
 from gaident.checks import real_number
 from gaident.data.record import Record
 from gaident.errors import RecordError, SettingsError
@@ -57,6 +57,8 @@ class FrictionMap:
         Samples of each bin.
     inertia : float
         The inertia that was taken out [kg m^2].
+    axis : {"rotary", "linear"}
+        Kind of the axis.
 
     See Also
     --------
@@ -70,6 +72,7 @@ class FrictionMap:
     scatter: Matrix
     count: NDArray[np.int64]
     inertia: float
+    axis: str = "rotary"
 
     @property
     def friction(self) -> Matrix:
@@ -88,8 +91,12 @@ class FrictionMap:
         middle = len(self.velocity) // 2
         return self.torque[:, :middle][:, ::-1], self.torque[:, middle:]
 
-    def summary(self, axis: str = "rotary") -> str:
-        """Return a table of the friction of each record by speed; `axis`: "linear" for units of m and N."""
+    def summary(self, axis: str | None = None) -> str:
+        """Return a table of the friction of each record by speed.
+
+        `axis`: "linear" for units of m and N, "rotary" for rad and N m; None: those of the axis.
+        """
+        axis = self.axis if axis is None else axis
         speeds = self.velocity[len(self.velocity) // 2 :]
         shown = [k for k in range(len(speeds)) if np.any(np.isfinite(self.friction[:, k]))]
         rows: list[tuple[str, ...]] = [(f"speed [{unit('rad/s', axis)}]", *self.names)]
@@ -117,14 +124,15 @@ class FrictionMap:
             "names": list(self.names),
             **lists,
             "inertia": self.inertia,
+            "axis": self.axis,
         }
 
-    def plot(self, axis: str = "rotary") -> Figure:
-        """Draw the torque of each record over the velocity; `axis`: "linear" for units of m and N."""
+    def plot(self, axis: str | None = None) -> Figure:
+        """Draw the torque of each record over the velocity; `axis`: as `summary` takes it."""
         from gaident.remedies.pictures import plot_friction
 
         rows = tuple(zip(self.names, self.torque, self.scatter, strict=True))
-        return plot_friction(self.velocity, rows, axis)
+        return plot_friction(self.velocity, rows, self.axis if axis is None else axis)
 
 
 def friction_map(
@@ -143,7 +151,7 @@ def friction_map(
     bins : int
         Bins of each direction, from 1 to 1000; they are closer at low speeds.
     axis : {"rotary", "linear"}
-        Kind of the axis.
+        Kind of the axis: which units `summary` and `plot` have.
 
     Returns
     -------
@@ -170,6 +178,7 @@ def friction_map(
     >>> np.nanmean(found.friction, axis=1).round(1).tolist()
     [0.2, 0.3]
     """
+    checked_axis(axis)
     given = (records,) if isinstance(records, Record) else records
     if not isinstance(given, Sequence) or not given or not all(isinstance(r, Record) for r in given):
         raise SettingsError(f"records is {type(records).__name__}: give a gaident.Record or a list of them")
@@ -195,7 +204,7 @@ def friction_map(
     parts = [_binned(m, mass, edges) for m in motions]
     torque, scatter, count = (np.array([part[i] for part in parts]) for i in range(3))
     names = tuple(rec.name or f"record {i}" for i, rec in enumerate(given, 1))
-    return FrictionMap(names, np.concatenate([-middles[::-1], middles]), edges, torque, scatter, count, mass)
+    return FrictionMap(names, np.concatenate([-middles[::-1], middles]), edges, torque, scatter, count, mass, axis)
 
 
 def _binned(motion: Motion, inertia: float, edges: Vector) -> tuple[Vector, Vector, NDArray[np.int64]]:

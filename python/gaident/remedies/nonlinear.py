@@ -15,13 +15,14 @@ from gaident.axis import Text, say
 from gaident.control.controller import Controller
 from gaident.data.record import Record
 from gaident.errors import GaidentError
+from gaident.models.effects import Effect
 from gaident.models.effects_linear import LINEAR
 from gaident.models.model import Model
 from gaident.models.simulate import Run, run
 from gaident.policy.table import POLICY
 from gaident.results.retuning import LoopFigures
 
-__all__ = ["simulated_with", "without_each"]
+__all__ = ["mendable", "simulated_with", "without_each"]
 
 Vector = NDArray[np.float64]
 
@@ -78,7 +79,7 @@ def without_each(
     try:
         whole = _error(_trial(model, found, period, step, after))
         for effect in model.effects:
-            if effect.name not in LINEAR:
+            if mendable(effect):
                 less = model.without_effect(effect.name, side=effect.side or None)
                 rows.append((effect.name, whole, _error(_trial(less, found, period, step, after))))
     except GaidentError:
@@ -86,8 +87,13 @@ def without_each(
     return tuple(rows)
 
 
+def mendable(effect: Effect) -> bool:
+    """Whether an effect can be a fault of the drive: a linear one is part of how it is built."""
+    return effect.name not in LINEAR
+
+
 def _nonlinear(model: Model) -> bool:
-    return any(effect.name not in LINEAR for effect in model.effects)
+    return any(map(mendable, model.effects))
 
 
 def _error(trial: _Tried) -> float:

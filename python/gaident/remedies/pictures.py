@@ -10,16 +10,18 @@ from numpy.typing import NDArray
 
 from gaident.axis import said, say, unit, velocity_unit
 from gaident.control.cascade import cascade_of
+from gaident.control.controller import Controller
 from gaident.policy.table import POLICY
 from gaident.remedies.loops import Loops, frequencies_of
 from gaident.remedies.plants import sampled_plants
 from gaident.results.retuning import Retuning
 from gaident.show.draw import new_figure
+from gaident.show.report.views import LoopCurves
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-__all__ = ["plot_friction", "plot_retuning"]
+__all__ = ["loop_curves", "plot_friction", "plot_retuning"]
 
 COLOURS = {"before": "#888888", "after": "#1f77b4"}
 SHOWN = 1e-3  # no decision: drawn: lowest size of a loop
@@ -42,22 +44,37 @@ def plot_friction(
     return figure
 
 
+def loop_curves(result: Retuning) -> tuple[LoopCurves, LoopCurves]:
+    """The velocity loop before and after, without frequencies at which it is too small to matter."""
+    before, after = (_curves(result, name, c) for name, c in (("before", result.given), ("after", result.controller)))
+    return before, after
+
+
+def _curves(result: Retuning, name: str, controller: Controller) -> LoopCurves:
+    plants = sampled_plants([result.model.linear], result.period, controller.delay + result.path_delay, result.velocity_age > 0.0)
+    frequencies = frequencies_of(plants, POLICY.checked_points, POLICY.checked_near)
+    loops = Loops(plants, cascade_of(controller), plants.responses(frequencies))
+    hertz, L = loops.responses.omega[0] / (2.0 * np.pi), loops.L[0]
+    seen = np.abs(L) > SHOWN
+    if not loops.stable.all():
+        return LoopCurves(name, hertz[seen], L[seen], None, None)
+    velocity, _, dt = loops.step()
+    time, end = dt * np.arange(velocity.shape[1], dtype=np.float64), _shown_time(result)
+    short = time <= end
+    answer = velocity[0, short]  # at rest from its end on
+    return LoopCurves(name, hertz[seen], L[seen], np.append(time[short], end), np.append(answer, answer[-1]))
+
+
 def plot_retuning(result: Retuning, axis: str = "rotary") -> Figure:
     """Size and phase of the broken loop, and the answer to a unit step of the velocity command."""
     figure = new_figure(8.0, 8.0)
     size, phase, answer = figure.subplots(3, 1)
-    for name, controller in (("before", result.given), ("after", result.controller)):
-        plants = sampled_plants([result.model.linear], result.period, controller.delay, result.velocity_age > 0.0)
-        loops = Loops(
-            plants, cascade_of(controller), plants.responses(frequencies_of(plants, POLICY.checked_points, POLICY.checked_near))
-        )
-        hertz, L = loops.responses.omega[0] / (2.0 * np.pi), loops.L[0]
-        seen = np.abs(L) > SHOWN
-        size.loglog(hertz[seen], np.abs(L[seen]), color=COLOURS[name], label=name)
-        phase.semilogx(hertz[seen], np.degrees(np.unwrap(np.angle(L[seen]))), color=COLOURS[name])
-        if loops.stable.all():
-            velocity, _, dt = loops.step()
-            answer.plot(dt * np.arange(velocity.shape[1]), velocity[0], color=COLOURS[name])
+    for one in loop_curves(result):
+        colour = COLOURS[one.name]
+        size.loglog(one.frequency, np.abs(one.loop), color=colour, label=one.name)
+        phase.semilogx(one.frequency, np.degrees(np.unwrap(np.angle(one.loop))), color=colour)
+        if one.time is not None and one.velocity is not None:
+            answer.plot(one.time, one.velocity, color=colour)
     size.axhline(1.0, color="black", linewidth=0.5)
     phase.axhline(-180.0, color="black", linewidth=0.5)
     size.set_ylabel("size of the loop")

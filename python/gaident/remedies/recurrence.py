@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -78,12 +79,14 @@ class _Step:
     cascade: Cascade
     period: float
 
+    @cached_property
     def filters(self) -> list[list[tuple[Vector, Vector]]]:
+        """Of command, velocity and torque, each as its coefficients."""
         c = self.cascade
         return [_digital(filters, self.period) for filters in (c.command_filters, c.velocity_filters, c.torque_filters)]
 
     def units(self) -> list[tuple[Vector, float, float]]:
-        size = 2 * sum(map(len, self.filters())) + 2
+        size = 2 * sum(map(len, self.filters)) + 2
         return [(row[:size], row[size], row[size + 1]) for row in np.eye(size + 2)]
 
     def __call__(self, state: Vector, r: float, w: float) -> tuple[Vector, float]:
@@ -100,7 +103,7 @@ class _Step:
                 x = y
             return float(x)
 
-        command, velocity, torque = self.filters()
+        command, velocity, torque = self.filters
         r, w = through(command, r), through(velocity, w)
         error = r - w
         if pi.ki == 0.0:  # a proportional controller has no integral, which would be a state that stays as it is

@@ -14,14 +14,15 @@ from gaident.axis import Text, say
 from gaident.checks import real_number
 from gaident.control.cascade import Cascade, cascade_of
 from gaident.control.controller import Controller, checked_controller
+from gaident.control.differencing import older
 from gaident.control.filters import Filter, LowPass, Notch
 from gaident.control.pi import PI
 from gaident.errors import SettingsError
 from gaident.models.effects_linear import LATE
 from gaident.models.model import Model
 from gaident.policy.table import POLICY
-from gaident.remedies.doubts import doubts_of
-from gaident.remedies.draws import drawn_models
+from gaident.remedies.doubts import doubts_of, no_gains
+from gaident.remedies.draws import age_of, drawn_models, path_delay_of
 from gaident.remedies.figures import Judge
 from gaident.remedies.loops import Loops, frequencies_of
 from gaident.remedies.nonlinear import simulated_with, without_each
@@ -37,10 +38,8 @@ from gaident.version import version
 __all__ = ["retune"]
 
 AS_GIVEN = "the given gains"
-NO_GAINS = (
-    "No gains were found with which every drive that the records leave possible is stable in the velocity loop: the given ones "
-    "stay. An axis on a spring, and one that hangs, have no integral of the velocity that comes to rest."
-)
+NO_FILTER = "A PI has no filter: where the drive can have one, give a Cascade around the PI as controller."
+NOT_ASKED = "None is added, because none was asked for."
 MOST_FILTERS = 8  # no decision: what an argument may be: filters of a cascade in one place
 HIGHEST_NOTCH = 0.45  # no decision: a start; of the sampling frequency
 NOTCH = (0.1, 0.6)  # no decision: a start; dampings of a notch
@@ -129,7 +128,7 @@ def retune(
         raise SettingsError(f"filters is {filters!r}: give True or False")
     if isinstance(seed, bool) or not isinstance(seed, int) or seed < 0:
         raise SettingsError(f"seed is {seed!r}: give a whole number >= 0")
-    age = result.velocity_age if isinstance(result, Diagnosis) else 0.0
+    age = age_of(result, given)
     axis = result.axis if isinstance(result, Diagnosis) else "rotary"
     drawn = drawn_models(result, POLICY.checked_drives, seed)
     linear = [_with_what_is_late(model) for model in drawn]
@@ -138,9 +137,10 @@ def retune(
             f"the model of the result has gain {linear[0].gain:g} and p = {linear[0].p}: gains are proposed for a drive that a "
             "positive torque turns forwards, with more poles than zeros; change the sign of the torque, or identify again"
         )
-    plants = sampled_plants(linear, period, given.delay, age > 0.0)
+    path_delay = path_delay_of(result)
+    plants = sampled_plants(linear, period, given.delay + path_delay, age > 0.0)
     work = _Retuning(
-        linear[0], cascade_of(given), period, age > 0.0, Search(plants.chosen(slice(0, POLICY.tuned_drives + 1)), asked.roomier())
+        linear[0], given, period, age > 0.0, Search(plants.chosen(slice(0, POLICY.tuned_drives + 1)), asked.roomier())
     )
     judge = Judge(
         plants, plants.responses(frequencies_of(plants, POLICY.checked_points, POLICY.checked_near)), asked.step, asked.noise
@@ -149,7 +149,7 @@ def retune(
     tuned, notes = work.best(allowed)
     tuned = work.held(tuned, judge)
     if tuned.excess >= UNSTABLE:
-        tuned, notes = replace(tuned, cascade=cascade_of(given), rule=AS_GIVEN), [say(NO_GAINS)]
+        tuned, notes = replace(tuned, cascade=cascade_of(given), rule=AS_GIVEN), [no_gains(linear)]
     proposal, more = work.placed(tuned.cascade)
     phase, gain = judge.margins(proposal)
     holds = float(np.mean((phase >= asked.phase_margin) & (gain >= asked.gain_margin)))
@@ -157,7 +157,8 @@ def retune(
     if isinstance(given, PI):
         found = replace(given, kp=proposal.velocity.kp, ki=proposal.velocity.ki)
     after = judge.figures(proposal)
-    told = simulated_with(result.model, given, found, period, asked.step, after)
+    now, then = older(given, age), older(found, age)
+    told = simulated_with(result.model, now, then, period, asked.step, after)
     return Retuning(
         controller=found,
         given=given,
@@ -167,17 +168,19 @@ def retune(
         phase_margin=asked.phase_margin,
         gain_margin=asked.gain_margin,
         torque_limit=asked.torque_limit,
+        torque_noise=asked.torque_noise,
         step=asked.step,
         holds=holds,
         drives=len(drawn) - 1,
         rule=tuned.rule,
         starts=work.starts(),
         simulated=told,
-        mended=without_each(result.model, found, period, asked.step, after),
+        mended=without_each(result.model, then, period, asked.step, after),
         notes=(*notes, *more, *_of_the_covariance(len(drawn) - 1, holds), *_of_the_mechanism(result.model)),
         model=result.model,
         period=period,
         velocity_age=age,
+        path_delay=path_delay,
         noise=asked.noise,
         seed=seed,
         axis=axis,
@@ -189,8 +192,9 @@ def retune(
 class _Retuning:
     """The work on one loop."""
 
-    def __init__(self, model: Model, cascade: Cascade, period: float, differenced: bool, search: Search) -> None:
-        self.model, self.cascade, self.search = model, cascade, search
+    def __init__(self, model: Model, given: Controller, period: float, differenced: bool, search: Search) -> None:
+        self.model, self.cascade, self.search = model, cascade_of(given), search
+        self.filterable, cascade = isinstance(given, Cascade), self.cascade
         self.asked = search.asked
         pi = cascade.velocity
         rules = rule_gains(model, cascade, period, differenced)
@@ -213,17 +217,14 @@ class _Retuning:
         more = math.exp(best.worth - plain.worth)
         if plain.excess > 0.0:
             text = "These gains alone do not keep what was asked for, with {} in the path of the {torque} a loop does."
-            return (best, [say(text, words)]) if allowed else (plain, [say(text, words)])
+            return (best, [say(text, words)]) if allowed else (plain, [say(text, words), *([say(NOT_ASKED)] * self.filterable)])
         if allowed:
             text = (
                 "Added in the path of the {torque}: {}. The loop is {:.2g} times as stiff with it as with the best gains alone."
             )
             return best, [say(text, words, more)]
-        text = (
-            "With {} in the path of the {torque} the loop would be {:.2g} times as stiff as with these gains alone. A PI has no "
-            "filter: where the drive can have one, give a Cascade around the PI as controller."
-        )
-        return plain, [say(text, words, more)]
+        text = "With {} in the path of the {torque} the loop would be {:.2g} times as stiff as with these gains alone. {}"
+        return plain, [say(text, words, more, NOT_ASKED if self.filterable else NO_FILTER)]
 
     def _without_needless(self, tuned: Tuned, added: int, name: str) -> tuple[Tuned, str]:
         """Without the first of two added filters, where the search from there does not need it."""

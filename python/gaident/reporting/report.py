@@ -18,6 +18,7 @@ from gaident.diagnosis.explain.evidence import velocity_curve
 from gaident.errors import GaidentError
 from gaident.files import check_writable, write_whole
 from gaident.identification.response.averaged import response_of, responses_of
+from gaident.reporting.remedies import remedies_of
 from gaident.reporting.runs import run_of
 from gaident.results.diagnosis import Diagnosis
 from gaident.results.identification import Identification
@@ -48,7 +49,8 @@ def report(
     """Write a result as one HTML page that needs nothing else: no network, no other file, no Python.
 
     From top to bottom: the verdict, measured against simulated, what is wrong, cause and evidence, parameters, before and after,
-    what could not be tested, the next experiment with its command as CSV, how it was computed.
+    what to do (of one diagnosis: other gains, feedforward, what mending each cause would bring), what could not be tested, the
+    next experiment with its command as CSV, how it was computed.
     About 1.7 MB, 1.4 of it plotly.js, packed.
     The file appears whole or not at all.
 
@@ -126,7 +128,11 @@ def report_page(
         return replace(view, scales=scales_of(units, view.axis), about=dict(about or {}))
 
     if isinstance(result, Diagnosis | Identification):
-        return page(result, whole(view_of(result, records, validation, axis)), plotly_js)
+        view = view_of(result, records, validation, axis)
+        if isinstance(result, Diagnosis):
+            made_of = _fitted(result, _records(records, result.records, "records"))
+            view = replace(view, remedies=remedies_of(result, made_of))
+        return page(result, whole(view), plotly_js)
     named = _named(result)
     given = {rec.digest: rec for rec in (*_records(records, (), "records"), *_records(validation, (), "validation"))}
     shown = []
@@ -163,7 +169,7 @@ def view_of(result: Diagnosis | Identification, records: Records, validation: Re
     held_out = _records(validation, result.validation_records if isinstance(result, Diagnosis) else (), "validation")
     known = {r.digest for r in given}
     runs = [run_of(result, rec) for rec in (*given, *(r for r in held_out if r.digest not in known))]
-    fitted = [rec for rec in given if rec.digest in result.digests] or list(given)
+    fitted = _fitted(result, given)
     longest = max(fitted, key=len, default=None)
     curve = response = None
     missing: str = ""
@@ -188,6 +194,11 @@ def _records(given: Records, own: Sequence[Record], name: str) -> tuple[Record, 
     if not isinstance(chosen, Sequence) or not all(isinstance(r, Record) for r in chosen):
         raise GaidentError(f"{name} is {type(given).__name__}: give a gaident.Record or a list of them")
     return tuple(chosen)
+
+
+def _fitted(result: Diagnosis | Identification, given: Sequence[Record]) -> list[Record]:
+    """The records that a result was made of; where none of them is given, those that are."""
+    return [rec for rec in given if rec.digest in result.digests] or list(given)
 
 
 def _made_with() -> dict[str, str]:

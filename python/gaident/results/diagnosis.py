@@ -11,7 +11,7 @@ from gaident.control.cascade import controller_of
 from gaident.control.controller import Controller
 from gaident.data.record import Record
 from gaident.errors import check_schema
-from gaident.models.drive_torque import as_differenced, driven_by, on_lines
+from gaident.models.drive_torque import as_read, driven_by
 from gaident.models.model import Model
 from gaident.providers import picture, provided
 from gaident.results.estimate import Estimate
@@ -208,8 +208,7 @@ class Diagnosis(WhatIf):
         RecordError
             Where no torque is logged and this controller makes none of what is.
         """
-        rec = on_lines(as_differenced(rec, self.controller), self.controller)
-        rec = rec.shifted(**moves) if (moves := self.log_shifts.get(rec.digest)) else rec
+        rec = as_read(rec, self.controller, self.log_shifts)
         return rec if self.controller is None or self.controller.one_equation else driven_by(rec, self.controller)
 
     def summary(self, axis: str | None = None, units: Mapping[str, str | float] | None = None) -> str:

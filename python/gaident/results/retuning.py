@@ -153,6 +153,8 @@ class Retuning(SavedResult):
         What was asked for [deg], [dB].
     torque_limit : float or None
         Largest torque that a step of the command may ask for [N m].
+    torque_noise : float or None
+        Largest rms of the torque that the noise of the velocity may make [N m].
     step : float
         Size of that step [rad/s].
     holds : float
@@ -175,6 +177,8 @@ class Retuning(SavedResult):
         Sample time of the controller [s].
     velocity_age : float
         See `Diagnosis.velocity_age`.
+    path_delay : float
+        Delay that frequency responses show beside the model [s].
     noise : float
         Standard deviation of the measured velocity's noise [rad/s].
     seed : int
@@ -217,6 +221,8 @@ class Retuning(SavedResult):
     noise: float
     seed: int
     axis: str = "rotary"
+    path_delay: float = 0.0
+    torque_noise: float | None = None
     digests: tuple[str, ...] = ()
     version: str = ""
     records: tuple[()] = field(default=(), compare=False, repr=False)
@@ -241,6 +247,11 @@ class Retuning(SavedResult):
         found += ["gain_margin"] * (after.gain_margin.value < self.gain_margin)
         if self.torque_limit is not None and after.step_torque.value > self.torque_limit:
             found.append("step_torque")
+        if self.torque_noise is not None and after.torque_noise.value > self.torque_noise:
+            found.append("torque_noise")
+        for name in ("phase_margin", "gain_margin"):
+            placed = getattr(after, f"position_{name}")
+            found += [f"position_{name}"] * (placed is not None and placed.value < getattr(self, name))
         return tuple(found)
 
     def summary(self, axis: str | None = None) -> str:
@@ -294,10 +305,10 @@ class Retuning(SavedResult):
                 model=Model.from_dict(data["model"]),
                 digests=tuple(data["digests"]),
                 version=data["gaident_version"],
-                **{name: data[name] for name in (*ASKED, *FOUND)},
+                **{name: data[name] for name in (*ASKED, *FOUND) if name in data},
                 **said,
             )
 
 
-ASKED = ("phase_margin", "gain_margin", "torque_limit", "step", "seed")
-FOUND = ("holds", "drives", "rule", "period", "velocity_age", "noise", "axis")
+ASKED = ("phase_margin", "gain_margin", "torque_limit", "torque_noise", "step", "seed")
+FOUND = ("holds", "drives", "rule", "period", "velocity_age", "noise", "axis", "path_delay")

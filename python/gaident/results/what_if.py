@@ -6,7 +6,8 @@ from gaident.control.controller import Controller
 from gaident.data.record import Record
 from gaident.errors import GaidentError
 from gaident.models.model import Model
-from gaident.models.simulate import Run, run
+from gaident.models.simulate import Run
+from gaident.providers import provided
 from gaident.results.saved import SavedResult
 
 __all__ = ["WhatIf"]
@@ -17,6 +18,7 @@ class WhatIf(SavedResult):
 
     model: Model
     controller: Controller | None
+    velocity_age: float
 
     def simulate_without(self, effect: str, rec: Record | None = None, *, side: str | None = None) -> Run:
         """Simulate the drive as it would be with one cause mended.
@@ -33,7 +35,7 @@ class WhatIf(SavedResult):
         Returns
         -------
         Run
-            Velocity, torque and position under `controller`, from rest.
+            Velocity, torque and position under `controller`, from rest; the velocity as the sensor shows it, `velocity_age` old.
 
         Raises
         ------
@@ -44,4 +46,6 @@ class WhatIf(SavedResult):
             raise GaidentError(f"rec is {type(rec).__name__}: give a gaident.Record")
         if rec is None and not self.records:
             raise GaidentError(f"records: a loaded {self.KIND} contains no data; give simulate_without({effect!r}, rec)")
-        return run(self.model.without_effect(effect, side=side), self.records[0] if rec is None else rec, self.controller)
+        mended, rec = self.model.without_effect(effect, side=side), self.records[0] if rec is None else rec
+        found: Run = provided("run_as_seen")(mended, rec, self.controller, self.velocity_age)
+        return found

@@ -7,6 +7,7 @@ import json
 import runpy
 import shutil
 import subprocess
+import zipfile
 from pathlib import Path
 
 import numpy as np
@@ -101,3 +102,32 @@ def test_a_printed_command_can_be_pasted(tmp_path: Path, monkeypatch: pytest.Mon
     (tmp_path / "gaident").chmod(0o755)
     monkeypatch.setattr("sys.argv", [str(tmp_path / "gaident")])
     assert program() == "gaident"
+
+
+@pytest.mark.parametrize(("form", "file"), [("mujoco", "run.xml"), ("urdf", "run.urdf"), ("sdf", "run.sdf")])
+def test_a_joint_for_a_simulator(here: Path, result: ga.Diagnosis, form: str, file: str) -> None:
+    assert main(["export", "run.json", "--to", form]) == 0
+    joint = ga.joint_parameters(result)
+    assert Path(file).read_text() == getattr(joint, f"to_{form}")("run")
+
+
+def test_gains_and_blocks_for_a_simulator(here: Path, result: ga.Diagnosis) -> None:
+    joint = ga.joint_parameters(result)
+    assert main(["export", "run.json", "--to", "wpilib", "--torque-constant", "0.5"]) == 0
+    assert json.loads(Path("run.wpilib.json").read_text()) == joint.to_wpilib(0.5)
+    assert main(["export", "run.json", "--to", "simscape", "--speed", "5", "--out", "blocks.csv"]) == 0
+    rows = list(csv.reader(Path("blocks.csv").read_text().splitlines()))
+    assert rows[0] == ["block", "parameter", "value", "unit"] and len(rows) == 1 + len(joint.to_simscape())
+    assert main(["export", "run.json", "--to", "simscape", "--speed", "-5", "--out", "blocks.csv"]) == 2
+
+
+def test_an_fmu(here: Path, result: ga.Diagnosis, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["export", "run.json", "--to", "fmu", "--dt", "1e-3", "--sources", "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["path"] == "run.fmu"
+    with zipfile.ZipFile("run.fmu") as made:
+        assert made.read("sources/run.c").decode() == result.model.to_c(None, 1e-3, name="run")
+        assert not any("binaries" in name for name in made.namelist())
+    assert main(["export", "run.json", "--to", "fmu", "--out", "b.fmu"]) == 2
+    assert "--to fmu needs the sample time" in capsys.readouterr().err
+    assert main(["export", "run.json", "--to", "fmu", "--dt", "1e-3", "--compiler", "no-such-cc", "--out", "b.fmu"]) == 2
+    assert "name one with --compiler gcc, or give --sources" in capsys.readouterr().err

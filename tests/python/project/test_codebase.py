@@ -50,6 +50,7 @@ ROOMS = [
         "diagnosis/diagnose",
     ),
     "remedies",  # gains, and tables of feedforward, of what was found
+    "simulators",  # the same under the names of other simulators
     *("reporting", "paper", "drive", "fleets", "cli", "cli/commands", "__init__", "__main__"),
 ]
 # What is still to be cut: modules that import each other.

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -35,6 +36,9 @@ def test_friction_and_load_of_each_record(tmp_path: Path) -> None:
     lines = (tmp_path / "map.csv").read_text().splitlines()
     assert len(lines) == 33 and lines[0] == "record,velocity,torque,scatter,count" and lines[1].startswith("cold,-")
     assert "cold" in found.summary() and "N m" not in found.summary(axis="linear")
+    sliding = replace(found, axis="linear")
+    assert sliding.summary() == found.summary(axis="linear") and sliding.summary(axis="rotary") == found.summary()
+    assert "m/s" in sliding.plot().axes[0].get_xlabel() and sliding.to_dict()["axis"] == "linear"
     assert len(found.plot().axes[0].containers) == 2 and "gaident/friction_map" in json_text(found.to_dict())
 
 
@@ -42,6 +46,9 @@ def test_wrong_use_is_told() -> None:
     rec = log_of(0.06, 0.0, "one")
     with pytest.raises(ga.GaidentError, match="records is int"):
         ga.friction_map(3)  # type: ignore[arg-type]
+    with pytest.raises(ga.GaidentError, match="axis is 'round'"):
+        ga.friction_map(rec, axis="round")
+    assert ga.friction_map(rec, inertia=J, bins=2, axis="linear").axis == "linear"
     with pytest.raises(ga.GaidentError, match="bins is 0"):
         ga.friction_map(rec, bins=0)
     with pytest.raises(ga.GaidentError, match="inertia is -1"):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -45,6 +46,18 @@ def loops_of(model: ga.Model, cascade: ga.Cascade, differenced: bool = False) ->
     return Loops(plants, cascade, plants.responses(frequencies_of(plants, 600, 81)))
 
 
+def response_of(L: Any) -> tuple[np.ndarray, np.ndarray]:
+    """Frequencies [rad/s] and the response there of a system of python-control, densely where a margin is read."""
+    omega = np.unique(np.concatenate([np.geomspace(1.0, np.pi / T, 400), np.linspace(1.0, np.pi / T, 500)]))
+    answer = L(np.exp(1j * omega * T))
+    crossings = (np.diff(np.abs(answer) > 1.0)) | (np.diff(answer.imag > 0.0) & (answer.real[1:] < 0.0))
+    at = np.append(np.nonzero(crossings)[0], np.argmin(np.abs(1.0 + answer)))
+    near = [np.linspace(omega[max(k - 1, 0)], omega[min(k + 2, len(omega) - 1)], 40) for k in at]
+    more = np.setdiff1d(np.concatenate(near), omega)
+    order = np.argsort(np.concatenate([omega, more]))
+    return np.concatenate([omega, more])[order], np.concatenate([answer, L(np.exp(1j * more * T))])[order]
+
+
 @pytest.mark.parametrize("drive", DRIVES)
 @pytest.mark.parametrize("name", CONTROLLERS)
 def test_margins_are_those_of_python_control(drive: str, name: str) -> None:
@@ -65,8 +78,7 @@ def test_margins_are_those_of_python_control(drive: str, name: str) -> None:
             numbers = ([1.0, 2.0 * z * w, w * w] for z in (one.numerator_damping, one.denominator_damping))
             law = law * control.sample_system(control.tf(*numbers), T, method="bilinear", prewarp_frequency=w)
     L = delayed.to_control(T) * law
-    omega = np.unique(np.concatenate([np.geomspace(1.0, np.pi / T, 1500), np.linspace(1.0, np.pi / T, 2500)]))
-    answer = L(np.exp(1j * omega * T))
+    omega, answer = response_of(L)
     _, phases, _, *_ = control.stability_margins(control.frd(answer, omega), returnall=True)
     assert loops.phase_margins[0] == pytest.approx(np.min(np.abs(phases), initial=np.inf), abs=0.05)
     assert 1.0 / loops.peaks[0] == pytest.approx(np.min(np.abs(1.0 + answer)), rel=5e-3, abs=3e-3)

@@ -12,8 +12,8 @@ import pytest
 
 import gaident as ga
 from gaident.axis import said
-from gaident.remedies.doubts import doubts_of
-from gaident.remedies.draws import drawn_models
+from gaident.remedies.doubts import doubts_of, no_gains
+from gaident.remedies.draws import age_of, drawn_models, path_delay_of
 from gaident.remedies.loops import Loops, frequencies_of
 from gaident.remedies.nonlinear import simulated_with, without_each
 from gaident.remedies.plants import sampled_plants
@@ -28,7 +28,7 @@ GIVEN = ga.PI(0.02, 0.5)
 def log_of(model: ga.Model, controller: Any, seed: int = 1, noise: float = 0.05) -> ga.Record:
     """Steps with reversals, with noise that the controller reads."""
     rng = np.random.default_rng(seed)
-    command = np.repeat(rng.permutation([20.0, -30.0, 10.0, -5.0, 40.0, -20.0, 3.0, 0.0]), 150)
+    command = np.repeat(rng.permutation([20.0, -30.0, 10.0, -5.0, 40.0, -20.0, 3.0, 0.0]), 75)
     v = noise * rng.standard_normal(len(command))
     run = ga.run(model, ga.Record(T, command=command - v, velocity=v), controller)
     return ga.Record(T, command=command, velocity=run.velocity + v, torque=run.torque)
@@ -75,14 +75,14 @@ def test_the_covariance_is_that_of_the_numbers(found: ga.Diagnosis) -> None:
 
 def test_a_step_asks_for_no_more_torque_than_allowed(found: ga.Diagnosis, tuned: ga.Retuning) -> None:
     free = tuned.after.step_torque.value
-    limited = ga.retune(found, ga.PI(0.02, 0.5, torque_limit=0.6 * free))
+    limited = ga.retune(replace(found, covariance=None), ga.PI(0.02, 0.5, torque_limit=0.6 * free))
     assert limited.torque_limit == 0.6 * free and limited.controller.limits[0] == 0.6 * free
     assert limited.after.step_torque.value <= 0.6 * free and limited.keeps
     assert limited.controller.gains.kp < tuned.controller.gains.kp
 
 
 def test_filters_are_added_to_a_cascade_where_they_pay(found: ga.Diagnosis, tuned: ga.Retuning) -> None:
-    cascade = ga.retune(found, ga.Cascade(GIVEN), phase_margin=50.0, gain_margin=9.0)
+    cascade = ga.retune(replace(found, covariance=None), ga.Cascade(GIVEN), phase_margin=50.0, gain_margin=9.0)
     assert isinstance(cascade.controller, ga.Cascade)
     added = len(cascade.controller.torque_filters)
     paid = any("Added" in note for note in cascade.notes)
@@ -94,7 +94,7 @@ def test_filters_are_added_to_a_cascade_where_they_pay(found: ga.Diagnosis, tune
 
 def test_the_gain_of_a_position_controller_is_proposed_too(found: ga.Diagnosis) -> None:
     cascade = ga.Cascade(GIVEN, position=ga.P(5.0), position_period=2e-3, velocity_feedforward=1.0)
-    result = ga.retune(found, cascade)
+    result = ga.retune(found, cascade, filters=False)
     proposal = result.controller
     assert isinstance(proposal, ga.Cascade) and proposal.position is not None
     assert proposal.position.gain > 5.0 and proposal.velocity_feedforward == 1.0
@@ -104,25 +104,46 @@ def test_the_gain_of_a_position_controller_is_proposed_too(found: ga.Diagnosis) 
 
 
 def test_a_proportional_loop_stays_one(found: ga.Diagnosis) -> None:
-    result = ga.retune(found, ga.Cascade(ga.PI(0.02, 0.0), position=ga.P(5.0)), filters=False)
+    result = ga.retune(replace(found, covariance=None), ga.Cascade(ga.PI(0.02, 0.0), position=ga.P(5.0)), filters=False)
     proposal = result.controller
     assert isinstance(proposal, ga.Cascade) and proposal.position is not None
     assert proposal.velocity.ki == 0.0 and proposal.velocity.kp > 0.02 and proposal.position.gain > 5.0 and result.keeps
     assert result.after.stiffness.value > 2.0 * result.before.stiffness.value
+    assert "None is added, because none was asked for." in result.notes[0] and "A PI has no filter" not in result.notes[0]
 
 
 def test_where_no_gains_are_stable_the_given_ones_stay(found: ga.Diagnosis) -> None:
     spring = ga.Model(2500.0, [-5.0 + 60.0j, -5.0 - 60.0j], [0.0])
     result = ga.retune(replace(found, model=spring, covariance=None))
     assert result.controller == GIVEN and not result.keeps and "stable" in result.missed
-    assert any("the given ones stay" in note for note in result.notes) and "NOT STABLE" in result.summary()
+    assert "The given ones stay" in result.notes[0] and "zero at 0, as of an axis on a spring" in result.notes[0]
+    assert "NOT STABLE" in result.summary() and "Missed: stability" in " ".join(result.summary().split())
+    assert "force that grows with the position" in said(result.notes[0], "linear")
+
+
+def test_a_zero_that_may_be_at_0_is_one_of_a_spring() -> None:
+    def axis(zero: float) -> ga.Model:
+        return ga.Model(2500.0, [-5.0 + 60.0j, -5.0 - 60.0j], [zero])
+
+    assert "on a spring" in no_gains([axis(-3e-4), axis(2e-4), axis(-1e-3)]) and "on a spring" in no_gains([axis(0.0)])
+    for others in ([axis(-3.0), axis(-2.0)], [ga.Model(2500.0, [-5.0])], [LAGGED.mechanism]):
+        assert no_gains(others).endswith("in the velocity loop: the given ones stay.")
 
 
 def test_a_falsified_model_is_said_so_first(found: ga.Diagnosis) -> None:
     hidden = LAGGED.with_effect("coulomb_friction", torque=0.3)
     idn = ga.identify(log_of(hidden, GIVEN), controller=GIVEN)
     assert idn.falsified
+    assert age_of(idn, GIVEN) == 0.0 and age_of(replace(found, velocity_age=0.5), GIVEN) == 0.5
+    made = tuple(r.with_channels(position=T * np.cumsum(r.velocity)) for r in idn.records)
+    assert age_of(replace(idn, records=made), GIVEN) == 0.5
+    assert age_of(replace(idn, records=made), ga.Cascade(GIVEN, period=T / 4)) == 0.125
+    assert path_delay_of(idn) == path_delay_of(found) == 0.0
+    late = replace(idn, delay=ga.Estimate(2.0 * T, 1e-5, "s"))
     result = ga.retune(idn, filters=False)
+    delayed = ga.retune(late, filters=False)
+    assert delayed.path_delay == 2.0 * T and delayed.controller.gains.kp < 0.8 * result.controller.gains.kp
+    assert ga.Retuning.from_dict(delayed.to_dict()) == delayed
     assert result.summary().startswith("Warning: The data contradict this model: the linear model is falsified.")
     assert "in doubt" in repr(result)
     doubts = doubts_of(replace(found, verdict="partly explained", loop_follows=False))
@@ -156,6 +177,21 @@ def test_it_is_saved_drawn_and_told(tuned: ga.Retuning, tmp_path: Path) -> None:
     text = tuned.summary()
     assert "phase margin" in text and "N m/rad" in text and "hold in" in text
     assert "N/m" in tuned.summary(axis="linear") and "N m" not in tuned.summary(axis="linear")
+
+
+def test_noise_and_the_position_loop_count_among_what_is_missed(tuned: ga.Retuning) -> None:
+    noise = tuned.after.torque_noise.value
+    quiet = replace(tuned, torque_noise=0.5 * noise)
+    assert quiet.missed == ("torque_noise",) and replace(tuned, torque_noise=2.0 * noise).keeps
+    told = " ".join(quiet.summary().split())
+    assert "does not keep what was asked for" in told and "of torque noise" in told and "Missed: torque noise, rms." in told
+    assert ga.Retuning.from_dict(quiet.to_dict()) == quiet
+    before = {name: value for name, value in tuned.to_dict().items() if name != "torque_noise"}
+    assert ga.Retuning.from_dict(before) == tuned
+    low, high = ga.Spread(40.0, 39.0, 41.0, "deg"), ga.Spread(12.0, 12.0, 12.0, "dB")
+    placed = replace(tuned, after=replace(tuned.after, position_phase_margin=low, position_gain_margin=high))
+    assert placed.missed == ("position_phase_margin",) and "margins of the position loop" in " ".join(placed.summary().split())
+    assert "force noise" in replace(quiet, axis="linear").summary()
 
 
 def test_a_difference_over_samples_is_late_in_the_loop(found: ga.Diagnosis) -> None:

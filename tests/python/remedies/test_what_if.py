@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import fields, replace
 
 import numpy as np
 import pytest
 
 import gaident as ga
+from drive_rig import Plant, run_drive, skip_without_library
+from gaident.control.differencing import older
+from gaident.remedies.nonlinear import simulated_with, without_each
+from gaident.results.retuning import LoopFigures, Spread
 from gaident.results.what_if import WhatIf
 
 DRIVE = ga.OneMass(J=4e-4, D=2e-3).model()
@@ -59,6 +63,72 @@ def test_models_are_compared_on_the_same_record(found: ga.Diagnosis, rec: ga.Rec
     assert alone.models[0].name == "1" and alone.models[0].force_error is None
     wild = ga.compare([ga.Model(2500.0, [5e4])], rec, GIVEN)
     assert wild.best.rmse == np.inf
+
+
+AXIS = Plant(J=4e-4, D=2e-3, kp=0.03, ki=1.0, dt=1e-3)
+LSB = 2.0 * np.pi / 2**22
+
+
+@pytest.fixture(scope="module")
+def differenced() -> ga.Record:
+    """The log of an encoder whose difference the drive takes for its velocity."""
+    skip_without_library()
+    command = np.repeat([0.0, 20.0, -30.0, 5.0, -3.0, 12.0], 150)
+    log = run_drive(AXIS, command, {"coulomb_friction": {"torque": 0.2}}, encoder=LSB, differenced=True)
+    return ga.Record(1e-3, command=command, velocity=log.velocity, torque=log.torque, position=1e-3 * np.cumsum(log.velocity))
+
+
+def rmse(rec: ga.Record, velocity: np.ndarray) -> float:
+    return float(np.sqrt(np.mean((rec.velocity - velocity) ** 2)))
+
+
+@pytest.mark.parametrize("controller", [GIVEN, None])
+def test_a_differenced_velocity_is_as_old_in_what_it_is_compared_with(
+    found: ga.Diagnosis, differenced: ga.Record, controller: ga.PI | None
+) -> None:
+    (true,) = ga.compare([STUCK], differenced, controller).models
+    ignored = rmse(differenced, ga.simulate(STUCK, differenced, controller))
+    assert 100.0 * true.rmse < ignored
+    # A diagnosis found the age, so that the position need not be logged; nor is what the log moved off the lines.
+    old = replace(found, model=STUCK, velocity_age=0.5)
+    bare = replace(differenced, position=None)
+    known, young = (ga.compare([one], bare, controller).models[0] for one in (old, STUCK))
+    assert known.rmse < 2.0 * true.rmse and young.rmse == pytest.approx(ignored)
+    assert known.force_error is not None and young.force_error is not None and known.force_error < 0.8 * young.force_error
+    late = bare.with_channels(velocity=np.append([0.0, 0.0], bare.velocity[:-2]))
+    moved = replace(old, log_shifts={late.digest: {"velocity": -2}})
+    assert ga.compare([moved], late, controller).models[0].rmse < 2.0 * true.rmse
+    # Where the log has the difference over two lines, the controller read that over one.
+    assert differenced.position is not None
+    central = differenced.with_channels(velocity=np.gradient(differenced.position, 1e-3))
+    assert ga.compare([STUCK], central, controller).models[0].rmse == pytest.approx(true.rmse, rel=0.05)
+
+
+@pytest.mark.parametrize("controller", [GIVEN, None])
+def test_a_mended_drive_has_the_velocity_that_its_sensor_shows(
+    found: ga.Diagnosis, differenced: ga.Record, controller: ga.PI | None
+) -> None:
+    assert differenced.torque is not None
+    drag = STUCK.with_effect("quadratic_drag", coefficient=1e-4)
+    old = replace(found, model=drag, controller=controller, velocity_age=0.5)
+    mended = old.simulate_without("quadratic_drag", differenced)
+    young = replace(old, velocity_age=0.0).simulate_without("quadratic_drag", differenced)
+    assert 5.0 * rmse(differenced, mended.velocity) < rmse(differenced, young.velocity)
+    if controller is None:
+        assert np.array_equal(mended.torque, differenced.torque) and np.array_equal(mended.position, young.position)
+
+
+def test_a_proposal_is_tried_with_the_velocity_that_the_controller_reads() -> None:
+    """Of a delay of a sample: z^2 - z + k, stable below 1; half a sample more: z^3 - z^2 + k (z + 1)/2, stable below 0.83."""
+    swinging = ga.PI(0.95 * 4e-4 / 1e-3, 0.1)
+    stable = ga.OneMass(J=4e-4, D=0.0).model().with_effect("quadratic_drag", coefficient=1e-6)
+    stable = stable.with_effect("transport_delay", delay=1e-3)
+    figure = Spread(0.01, 0.01, 0.01, "s")
+    after = LoopFigures(**{f.name: figure for f in fields(LoopFigures)})
+    (now,) = without_each(stable, swinging, 1e-3, 10.0, after)
+    (then,) = without_each(stable, older(swinging, 0.5), 1e-3, 10.0, after)
+    assert now[1] < 2.0 and then[1] > 1e3
+    assert simulated_with(stable, swinging, older(swinging, 0.5), 1e-3, 10.0, after)[0].startswith("With all effects")
 
 
 def test_wrong_use_is_told(rec: ga.Record) -> None:

@@ -50,7 +50,7 @@ from gaident.reporting import report_page
 from gaident.results.finding import Finding
 from gaident.show.report import parts
 from page import Reader, charts_of
-from report_cases import diagnosed
+from report_cases import diagnosed, retuned_once
 from written_out import CONTROLLER, DT, ONE_MASS, TWO_MASS, changed, drive
 
 PACKAGE = Path(ga.__file__).parent
@@ -318,6 +318,7 @@ def test_what_is_shown_keeps_to_its_axis(
 ) -> None:
     monkeypatch.setattr(parts, "picture", lambda chart: b"png")
     monkeypatch.setattr("plotly.offline.get_plotlyjs", lambda: "plotly()")
+    retuned_once(monkeypatch)
     rotary, linear = (bare(SHOWN[name](*results, axis)) for axis in AXES)
     strange = [rotary[max(0, m.start() - 60) : m.end() + 20] for m in LINEAR.finditer(rotary)]
     strange += [linear[max(0, m.start() - 60) : m.end() + 20] for m in ROTARY.finditer(linear)]

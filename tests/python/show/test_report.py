@@ -30,9 +30,9 @@ from gaident.show.report.command import proposal_csv
 from gaident.show.report.live import figure, json_of
 from gaident.show.report.packing import packed
 from page import Reader, charts_of, text_of, unpacked
-from report_cases import HOSTILE, ambiguous, diagnosed, hostile
+from report_cases import HOSTILE, ambiguous, diagnosed, hostile, retuned_once
 
-CHAPTERS = ["measured", "wrong", "cause", "parameters", "gain", "untested", "next", "how"]
+CHAPTERS = ["measured", "wrong", "cause", "parameters", "gain", "remedies", "untested", "next", "how"]
 
 
 @pytest.fixture(scope="module")
@@ -45,6 +45,7 @@ def fast(monkeypatch: pytest.MonkeyPatch) -> None:
     """Without the pictures for print, which take most of the time, and with a short name for plotly.js."""
     monkeypatch.setattr(parts, "picture", lambda chart: b"png of " + chart.key.encode())
     monkeypatch.setattr("plotly.offline.get_plotlyjs", lambda: "plotly()")
+    retuned_once(monkeypatch)
 
 
 def test_a_diagnosis_reads_from_verdict_to_how_it_was_computed(dia: ga.Diagnosis, fast: None) -> None:
@@ -63,7 +64,7 @@ def test_a_diagnosis_reads_from_verdict_to_how_it_was_computed(dia: ga.Diagnosis
         assert words in seen.text, words
     charts = charts_of(page)["charts"]
     wanted = {"run-0", "run-1", "missing-velocity", "missing-reversals", "missing-orders", "missing-place", "missing-time"}
-    assert set(charts) == wanted | {"residual-frequency", "response", "held-out-record", "next-command"}
+    assert set(charts) == wanted | {"residual-frequency", "response", "held-out-record", "loop", "loop-step", "next-command"}
     assert charts["missing-time"]["link"] == charts["run-0"]["link"] == "run-0"
     titles = [charts["run-0"]["layout"][f"yaxis{n}"]["title"]["text"] for n in ("", "2", "3")]
     assert titles == ["velocity [rad/s]", "error [rad/s]", "torque [N m]"]
@@ -137,7 +138,7 @@ def test_a_loaded_result_says_what_needs_the_record(dia: ga.Diagnosis, fast: Non
     dia.save(tmp_path / "dia.json")
     back = ga.load(tmp_path / "dia.json")
     seen = Reader(report_page(back))
-    assert seen.text.count("gaident report RESULT.json LOG") == 4 and charts_of(report_page(back))["charts"] == {}
+    assert seen.text.count("gaident report RESULT.json LOG") == 5 and charts_of(report_page(back))["charts"] == {}
     assert "inertia" in seen.text and dia.digests[0] in seen.text and "not at hand" in seen.text
     # Without anything to draw 2 MB less.
     assert "plotly()" in unpacked(report_page(dia)) and "plotly()" not in unpacked(report_page(back))

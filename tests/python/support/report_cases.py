@@ -6,11 +6,12 @@ from dataclasses import replace
 from functools import cache
 
 import numpy as np
+import pytest
 
 import gaident as ga
 from friction_drive import CONTROLLER, DT, drive_record
 
-__all__ = ["HOSTILE", "ambiguous", "diagnosed", "hostile"]
+__all__ = ["HOSTILE", "ambiguous", "diagnosed", "hostile", "retuned_once"]
 
 HOSTILE = "</script><script>window.hacked=1</script><img src=x onerror=window.hacked=2> \"'&$x$ \u2028"
 
@@ -19,6 +20,21 @@ HOSTILE = "</script><script>window.hacked=1</script><img src=x onerror=window.ha
 def diagnosed() -> ga.Diagnosis:
     """Friction found, judged on a second record."""
     return ga.diagnose(drive_record(), CONTROLLER, validation=drive_record(1))
+
+
+def retuned_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Pages of one drive take its other gains from the first that was made: the search for them takes a second."""
+
+    def retuned(dia: ga.Diagnosis, **named: bool) -> ga.Retuning:
+        key = (dia.model, dia.controller, tuple(r.digest for r in dia.records), tuple(named.items()))
+        if key not in _RETUNED:
+            _RETUNED[key] = ga.retune(dia, **named)
+        return _RETUNED[key]
+
+    monkeypatch.setattr("gaident.reporting.remedies.retune", retuned)
+
+
+_RETUNED: dict[object, ga.Retuning] = {}
 
 
 def ambiguous(dia: ga.Diagnosis) -> ga.Diagnosis:

@@ -1,18 +1,21 @@
-"""gaident export: a saved result for C, python-control, SciPy or a table."""
+"""gaident export: a saved result for C, an FMU, python-control, SciPy, other simulators or a table."""
 
 from __future__ import annotations
 
 import argparse
 import csv
 import io
+import json
 import math
+from collections.abc import Callable
 from pathlib import Path
 
 from gaident.cli.export_options import FORMS
-from gaident.cli.output import print_json, target_of, write
-from gaident.control.pi import bare_pi
+from gaident.cli.output import naming, print_json, target_of, write
+from gaident.control.pi import PI, bare_pi
 from gaident.errors import SettingsError
 from gaident.export.c_source import c_name
+from gaident.export.fmu import to_fmu
 from gaident.models.effects_linear import LINEAR
 from gaident.models.model import Model
 from gaident.results.diagnosis import Diagnosis
@@ -20,6 +23,8 @@ from gaident.results.estimate import Estimate, of_axis
 from gaident.results.identification import Identification
 from gaident.results.json_text import ROOTS
 from gaident.results.store import load
+from gaident.simulators.joint import JointParameters
+from gaident.simulators.parameters import joint_parameters
 
 __all__ = ["export_command"]
 
@@ -36,13 +41,23 @@ def export_command(args: argparse.Namespace) -> None:
     assert target is not None
     if args.out is None and target.exists():
         raise SettingsError(f"{target}: there is such a file already; name it, or another one, with --out")
+    if args.to == "fmu":
+        _fmu(result, target, args)
+        _told(target, args)
+        return
     if args.to == "c":
         text = _c_source(result, target, args)
+    elif args.to in JOINT:
+        text = JOINT[args.to](joint_parameters(result, speed=args.speed), c_name(target.stem), args)
     elif args.to == "csv":
         text = _table(result, args.axis or (result.axis if isinstance(result, Diagnosis) else "rotary"))
     else:
         text = _python(result, args)
     write(target, text.encode())
+    _told(target, args)
+
+
+def _told(target: Path, args: argparse.Namespace) -> None:
     if args.json:
         print_json({"schema": "gaident/export", "schema_version": 1, "path": str(target), "form": args.to})
         return
@@ -51,15 +66,28 @@ def export_command(args: argparse.Namespace) -> None:
 
 def _c_source(result: Diagnosis | Identification, target: Path, args: argparse.Namespace) -> str:
     """The C99 file; --closed: with the result's controller, command to velocity."""
+    model, loop = _stepped(result, args)
+    return model.to_c(None, dt=args.dt, controller=loop, name=c_name(target.stem))
+
+
+def _fmu(result: Diagnosis | Identification, target: Path, args: argparse.Namespace) -> None:
+    model, loop = _stepped(result, args)
+    axis = args.axis or (result.axis if isinstance(result, Diagnosis) else "rotary")
+    with naming(target):
+        to_fmu(model, target, args.dt, loop, axis=axis, binary=not args.sources, compiler=args.compiler)
+
+
+def _stepped(result: Diagnosis | Identification, args: argparse.Namespace) -> tuple[Model, PI | None]:
+    """The model, and with --closed its controller, as they are stepped through in C."""
     if args.dt is None:
-        raise SettingsError("--to c needs the sample time of its steps: give --dt [s]")
+        raise SettingsError(f"--to {args.to} needs the sample time of its steps: give --dt [s]")
     model, _ = _linear(result, args)
     loop = bare_pi(result.controller)
     if args.closed and loop is None:
         raise SettingsError(
             "--closed: in C the controller is a bare PI at the steps of the model; leave it out: torque to velocity"
         )
-    return model.to_c(None, dt=args.dt, controller=loop if args.closed else None, name=c_name(target.stem))
+    return model, loop if args.closed else None
 
 
 def _linear(result: Diagnosis | Identification, args: argparse.Namespace) -> tuple[Model, str]:
@@ -87,6 +115,23 @@ def _python(result: Diagnosis | Identification, args: argparse.Namespace) -> str
     ]
     made = "signal.ZerosPolesGain(zeros, poles, gain)" if args.to == "scipy" else "control.zpk(zeros, poles, gain)"
     return "\n".join([*head, f"plant = {made}", ""])
+
+
+def _blocks(joint: JointParameters, name: str, args: argparse.Namespace) -> str:
+    """The parameters of Simscape's blocks as CSV."""
+    text = io.StringIO()
+    csv.writer(text, lineterminator="\n").writerows([("block", "parameter", "value", "unit"), *joint.to_simscape()])
+    return text.getvalue()
+
+
+JOINT: dict[str, Callable[[JointParameters, str, argparse.Namespace], str]] = {
+    "mujoco": lambda joint, name, args: joint.to_mujoco(name),
+    "urdf": lambda joint, name, args: joint.to_urdf(name),
+    "sdf": lambda joint, name, args: joint.to_sdf(name),
+    "wpilib": lambda joint, name, args: json.dumps(joint.to_wpilib(args.torque_constant), indent=1) + "\n",
+    "simscape": _blocks,
+}
+"""What --to takes of a joint -> the text of its file."""
 
 
 def _table(result: Diagnosis | Identification, axis: str) -> str:

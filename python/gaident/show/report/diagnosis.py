@@ -46,6 +46,7 @@ from gaident.show.report.parts import (
     roots_table,
     tile,
 )
+from gaident.show.report.remedies import remedies_section
 from gaident.show.report.views import View
 from gaident.show.second_method import comparison_rows, force_rows, force_words, method_words
 from gaident.show.wording import (
@@ -154,6 +155,7 @@ def chapters(dia: Diagnosis, view: View, drawn: Charts) -> list[Section]:
         _causes(dia, view),
         _parameters(dia, view, drawn),
         _gain(dia, view, drawn),
+        remedies_section(view, drawn),
         _untested(dia, view),
         _next(dia, view, drawn),
         _how(dia, view),

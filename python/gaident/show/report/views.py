@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gaident.results.frequency import Responses
+from gaident.results.retuning import Retuning
 from gaident.show.units import Scales
 
-__all__ = ["Curve", "RecordView", "Vector", "View"]
+__all__ = ["Beforehand", "Curve", "LoopCurves", "Mended", "RecordView", "Remedies", "Vector", "View"]
 
 Vector = NDArray[np.float64]
 Curve = tuple[Vector, Vector, str]
@@ -51,12 +53,92 @@ class RecordView:
 
 
 @dataclass(frozen=True, eq=False)
+class LoopCurves:
+    """A velocity loop under one controller.
+
+    name: "before" or "after"; frequency [Hz] (f,); loop: broken at the torque (f,).
+    time [s] and velocity [rad/s] of a unit step of the command (k,), None where the loop is not stable.
+    """
+
+    name: str
+    frequency: Vector
+    loop: NDArray[np.complex128]
+    time: Vector | None
+    velocity: Vector | None
+
+
+class OneWave(Protocol):
+    """Of the torque by angle: the effect behind it, periods per turn, coefficients of sine and cosine [N m]."""
+
+    @property
+    def effect(self) -> str: ...
+    @property
+    def order(self) -> float: ...
+    @property
+    def sine(self) -> float: ...
+    @property
+    def cosine(self) -> float: ...
+
+
+class Beforehand(Protocol):
+    """What a page shows of `gaident.FeedforwardTables`, which says what each is."""
+
+    @property
+    def velocity(self) -> Vector: ...
+    @property
+    def friction(self) -> Vector: ...
+    @property
+    def viscous(self) -> float: ...
+    @property
+    def constant(self) -> float: ...
+    @property
+    def inertia(self) -> float: ...
+    @property
+    def waves(self) -> Sequence[OneWave]: ...
+    @property
+    def notes(self) -> Sequence[str]: ...
+
+
+@dataclass(frozen=True)
+class Mended:
+    """The following error of a simulated record, rms, in `unit`.
+
+    record: its name; now: as the drive is; retuned: under the proposed gains, None without them.
+    without: effect, side -> the error without it.
+    """
+
+    record: str
+    unit: str
+    now: float
+    retuned: float | None
+    without: Mapping[tuple[str, str], float]
+
+
+@dataclass(frozen=True, eq=False)
+class Remedies:
+    """What to do; what is None is not there, and no_gains, no_tables, no_mended say why.
+
+    doubts: why the model behind all of it is not to be trusted. retuning: other gains, with the loops before and after.
+    """
+
+    doubts: tuple[str, ...] = ()
+    retuning: Retuning | None = None
+    loops: tuple[LoopCurves, ...] = ()
+    tables: Beforehand | None = None
+    mended: Mended | None = None
+    no_gains: str = ""
+    no_tables: str = ""
+    no_mended: str = ""
+
+
+@dataclass(frozen=True, eq=False)
 class View:
     """All that a report knows beside the result.
 
     runs: one per record, those that were fitted first. curve: (velocity, torque, label) of named effects. response: of the
     longest record, see `gaident.results.frequency.Responses`; without it no_response says why. made_with: what computed
     and drew the page -> version. axis: "rotary" or "linear". scales: to the user's units. about: what stands below the title.
+    remedies: what to do with a diagnosis; None where that is not worked out.
     """
 
     runs: tuple[RecordView, ...] = ()
@@ -67,6 +149,7 @@ class View:
     made_with: Mapping[str, str] = field(default_factory=dict)
     scales: Scales = field(default_factory=dict)
     about: Mapping[str, str] = field(default_factory=dict)
+    remedies: Remedies | None = None
 
     @property
     def fitted(self) -> tuple[RecordView, ...]:

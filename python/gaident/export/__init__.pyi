@@ -1,0 +1,3 @@
+from .fmu import to_fmu
+
+__all__ = ["to_fmu"]

@@ -1,0 +1,7 @@
+"""To other simulators: what was found, under the names of MuJoCo, URDF, SDF, WPILib and Simscape."""
+
+from __future__ import annotations
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)
