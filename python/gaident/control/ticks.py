@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from gaident.control.between import at_the_clock, between_lines
 from gaident.control.profile import profile_between
+from gaident.control.smoothing import expected_at
 from gaident.errors import ControllerError
 
 __all__ = [
@@ -21,6 +22,7 @@ __all__ = [
     "push_of",
     "pushed_between",
     "smooth_between",
+    "straight_between",
     "ticks_of",
 ]
 
@@ -95,15 +97,27 @@ def _slope(signal: Vector, step: int, period: float) -> Vector:
 
 
 def smooth_between(line: Vector, every: int) -> Vector:
-    """A velocity at the controller's samples: a cubic spline through the lines of its log, which goes on behind the last."""
+    """A velocity at the controller's samples: as logged on the lines, between them a cubic spline without their noise.
+
+    See `control/smoothing.py`. It goes on behind the last line.
+    """
     if every == 1:
         return np.ascontiguousarray(line, dtype=np.float64)
     from scipy.interpolate import make_interp_spline
 
     n = len(line)
-    spline = make_interp_spline(np.arange(n), line, k=3)
+    spline = make_interp_spline(np.arange(n), expected_at(line), k=3)
     at = np.minimum(np.arange(n * every) / every, n - 1.0)
-    return np.asarray(spline(at), dtype=np.float64)
+    between = np.array(spline(at), dtype=np.float64)
+    between[::every] = line
+    return between
+
+
+def straight_between(line: Vector, every: int) -> Vector:
+    """The same where the velocity goes straight between what the lines have beside their noise."""
+    between = at_the_clock(expected_at(line), every)
+    between[::every] = line
+    return between
 
 
 def pushed_between(line: Vector, every: int, torque_of: Callable[[Vector], Vector], jumps: NDArray[np.intp]) -> Vector:

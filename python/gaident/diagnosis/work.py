@@ -115,7 +115,8 @@ class Work:
         }
         shown = self.at_controller.controller or self.controller
         missing = bool(known) and data.told_by_torque and shown is self.controller  # a limit that its simulated loop would lack
-        self.follows = self.at_controller.follows and not missing and not (data.slower and self.driving.in_doubt)
+        closed = self.driving.simulated and not (data.slower and self.driving.in_doubt)
+        self.follows = self.at_controller.follows and not missing and closed
         data = replace(data, controller=shown, loop_follows=self.follows, known_noise=self.noise, found=self.driving.found)
         self.data = data if self.at_controller.controller is not None else data.with_effects(known)
         self.excited = excitation(

@@ -14,10 +14,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gaident.control import core
-from gaident.control.between import at_lines, at_the_clock, between_lines
+from gaident.control.between import at_lines, between_lines
 from gaident.control.cascade import Cascade
 from gaident.control.pi import PI
-from gaident.control.ticks import push_of, smooth_between
+from gaident.control.ticks import push_of, smooth_between, straight_between
 from gaident.data.record import Record
 from gaident.data.torque_kind import MEAN
 from gaident.models.made_torque import stored_beside
@@ -27,6 +27,7 @@ from gaident.policy.table import POLICY
 __all__ = ["Log", "centred", "correlation", "correlation_of", "log_of", "numbered", "plateau_of", "unlimited", "whitened"]
 
 Vector = NDArray[np.float64]
+Matrix = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,13 +60,27 @@ class Log:
         Of a record that begins under load, with what the torque shows that the integrator stored.
         """
         every = len(self.velocity) // len(self.source)
-        velocity = at_the_clock(self.velocity[::every], every) if straight else self.velocity
+        velocity = straight_between(self.velocity[::every], every) if straight else self.velocity
         ticks = cascade.ticks(self.dt, self.between, self.position)
         loop = cascade.core_loop(self.dt)
         torque = at_lines(core.servo_torque(self.dt, ticks, velocity, loop), every, self.mean)
         if self.moving or not (stored := stored_beside(self.torque, torque, cascade)):
             return torque
         return at_lines(core.servo_torque(self.dt, ticks, velocity, loop, stored), every, self.mean, stored)
+
+    def asked(self, cascade: Cascade) -> tuple[Vector, Matrix]:
+        """At the controller's samples: what a position controller asks for [rad/s] (n r,), slope and sign of v* (2, n r)."""
+        assert cascade.position is not None and self.position is not None
+        fed = [
+            replace(cascade, acceleration_feedforward=a, friction_feedforward=f).ticks(self.dt, self.between, self.position)
+            for a, f in ((1.0, 0.0), (0.0, 1.0))
+        ]
+        ticks, every = fed[0], cascade.position_every(self.dt)
+        made = cascade.position.gain * (ticks.source - ticks.position)
+        command = np.repeat(made[::every], every)[: len(made)]
+        if len(ticks.velocity_feedforward):
+            command = command + ticks.velocity_feedforward
+        return command, np.stack([one.torque_feedforward for one in fed])
 
     def pushed(self, cascade: Cascade) -> Log:
         """The log with a velocity between the lines whose slope jumps where the command does, see `pushed_between`."""

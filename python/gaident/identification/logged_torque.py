@@ -16,7 +16,7 @@ Where it does not follow, one number of the controller at a time is estimated fr
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import Any, NamedTuple
 
@@ -27,6 +27,8 @@ from gaident.axis import Text, joined, say, unit_text
 from gaident.control.cascade import FEEDFORWARDS, Cascade, P, cascade_of
 from gaident.control.controller import Controller
 from gaident.control.found import FoundNumbers
+from gaident.control.pi import RULES
+from gaident.control.ticks import smooth_between
 from gaident.data.record import Record
 from gaident.data.signals.lattice import rounding_step
 from gaident.errors import GaidentError
@@ -38,7 +40,16 @@ from gaident.models.starts import noise_std, starts_moving
 from gaident.policy.table import POLICY
 from gaident.results.estimate import Estimate
 
-__all__ = ["Corrected", "comparable", "corrected", "noise_between", "not_followed", "tells_of_controller"]
+__all__ = [
+    "Corrected",
+    "comparable",
+    "corrected",
+    "noise_between",
+    "not_followed",
+    "off_by",
+    "smoothed_again",
+    "tells_of_controller",
+]
 
 Vector = NDArray[np.float64]
 
@@ -79,9 +90,17 @@ def _off(rec: Record, controller: Controller) -> float:
     """Rms of logged minus made torque [N m], where that is more than the velocity between the lines can make; or 0."""
     cascade = cascade_of(controller)
     log = log_of(rec, len(rec), cascade, whole=cascade.velocity.anti_windup == "none").pushed(cascade)
-    made = log.made(cascade)
+    return off_by(rec, log, cascade, lambda one, straight: one.made(cascade, straight))
+
+
+def off_by(rec: Record, log: Log, cascade: Cascade, made_of: Callable[[Log, bool], Vector]) -> float:
+    """The same of any law; made_of: its torque [N m] (n,) of a log, and whether the velocity goes straight between its lines.
+
+    cascade: what the control error and the gain of its integral are taken of.
+    """
+    made = made_of(log, False)
     left = log.torque - made
-    others = [one.made(cascade, straight) - made for one, straight in _others(log, rec)]
+    others = [made_of(one, straight) - made for one, straight in _others(log, rec)]
     rho = correlation(np.sum(others, axis=0), log.stretch)
 
     def rms(d: Vector, rho: float) -> float:
@@ -124,6 +143,14 @@ def noise_between(rec: Record, count: int, every: int) -> Vector:
     return noise
 
 
+def smoothed_again(rec: Record, velocity: Vector, every: int) -> Vector:
+    """The velocity between the lines (n r,) as it would be taken of lines with as much noise again [rad/s]."""
+    line = velocity[::every]
+    made = smooth_between(line + noise_std(rec.velocity) * np.random.default_rng(1).standard_normal(len(line)), every)
+    made[::every] = line
+    return made
+
+
 def _others(log: Log, rec: Record) -> list[tuple[Log, bool]]:
     """The log with other velocities between its lines, and whether the velocity goes straight there."""
     noise = noise_between(rec, len(log.velocity), len(log.velocity) // len(log.source))
@@ -140,13 +167,16 @@ class Corrected(NamedTuple):
 
 
 def corrected(records: Sequence[Record], controller: Controller) -> Corrected | None:
-    """The other interpolation of its command, or the one number, with which the torque of all records follows.
+    """The other interpolation of its command, the rule of its integral, or the one number, with which all torques follow.
 
     None where no change is enough, or several numbers are as good.
+    A rule goes before a number: it has none, and on the lines a rectangular integral is a trapezoidal one with kp +- ki T/2.
     """
     for other in controller.interpolations(records[0].dt)[1:]:
         if not _doubts(records, other):
             return Corrected(other, {}, say("With {} it does: all simulations use this.", interpolated(other)))
+    if (rule := _other_rule(records, cascade_of(controller))) is not None:
+        return rule
     found = []
     for given, one in _with_one_open(cascade_of(controller)):
         try:
@@ -163,6 +193,16 @@ def corrected(records: Sequence[Record], controller: Controller) -> Corrected | 
             Corrected(numbers.controller, numbers.estimates, say(text, joined(" and ", values), given, also), numbers.found)
         )
     return found[0] if len(found) == 1 else None
+
+
+def _other_rule(records: Sequence[Record], cascade: Cascade) -> Corrected | None:
+    """The cascade with the one other rule of its integral with which the torque of all records follows."""
+    rules = {name: replace(cascade, velocity=replace(cascade.velocity, rule=name)) for name in RULES}
+    found = [(name, one) for name, one in rules.items() if name != cascade.velocity.rule and not _doubts(records, one)]
+    if len(found) != 1:
+        return None
+    name, one = found[0]
+    return Corrected(one, {}, say("With the rule {} of its integral it does: all simulations use this.", repr(name)))
 
 
 def _value(name: str, e: Estimate) -> Text:

@@ -40,13 +40,14 @@ TWO_MASSES = 3  # no decision: how many poles two masses have
 HALF = 0.5  # no decision: of a sample, the age of a mean over it
 
 
-def driven_by(rec: Record, controller: Controller) -> Record:
+def driven_by(rec: Record, controller: Controller, made: Vector | None = None) -> Record:
     """The record with the torque that drove the motor, held over each line of the log [N m], and no more than drives it.
 
     Where the log has a line for each of the controller's samples, that is the logged torque, or the one that the controller
     makes of the measured signals.
     Of a torque logged every r-th sample, it is the mean over its r samples between the lines, see `_at_its_clock`.
     A log of means has it but for the first of these samples, see `_mean_ahead`.
+    made: the torque at its samples [N m] (n r,) where another law than this controller makes it.
 
     A known delay of the controller is part of it: `late`. Raises RecordError where a torque is neither logged nor can be made.
     """
@@ -56,7 +57,7 @@ def driven_by(rec: Record, controller: Controller) -> Record:
     stored = stored_torque(whole, controller, driven=False)
     before = torque[0] if starts_moving(whole, None) else stored
     if every > 1:
-        at_clock = _at_its_clock(rec, torque, controller, stored).reshape(len(rec), every)
+        at_clock = _at_its_clock(rec, torque, controller, stored, made).reshape(len(rec), every)
         torque = _mean_ahead(torque, at_clock) if rec.torque_log == MEAN else at_clock.mean(axis=1)
     return rec.with_channels(torque=late(torque, controller.delay / rec.dt, before), torque_log=SAMPLE)
 
@@ -108,15 +109,15 @@ def _straight(rec: Record, line: Vector, every: int) -> Vector:
     return made
 
 
-def _at_its_clock(rec: Record, torque: Vector, controller: Controller, stored: float) -> Vector:
+def _at_its_clock(rec: Record, torque: Vector, controller: Controller, stored: float, made: Vector | None) -> Vector:
     """A torque logged now and then [N m] (n,) at all of the controller's samples (n every,).
 
     Between the lines it goes as this controller makes it of command and velocity, and what it is off by on the lines goes
     straight. Where that changes more from line to line than the torque itself, the torque goes straight.
-    stored: what the integrator held before the record [N m].
+    stored: what the integrator held before the record [N m]. made: see `driven_by`.
     """
     every = controller.log_every(rec.dt)
-    made = made_at_its_clock(rec, controller, stored)
+    made = made_at_its_clock(rec, controller, stored) if made is None else made
     if made is not None:
         off = torque - at_lines(made, every, rec.torque_log == MEAN, stored)
         if np.sum(np.diff(off) ** 2) < np.sum(np.diff(torque) ** 2):

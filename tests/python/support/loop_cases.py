@@ -6,6 +6,7 @@ from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
+from scipy.linalg import expm
 
 import gaident as ga
 from drive_cases import EFFECTS, LATER, RAMPS, command_for, level_command, random_plant, stable
@@ -14,7 +15,10 @@ from drive_rig import Array, Noise, Plant, RanAwayError, between_lines, run_driv
 __all__ = [
     "EVERY",
     "LOOPS",
+    "BAND",
+    "DECAY",
     "PERIOD",
+    "SCHEMES",
     "industrial_plant",
     "jump_levels",
     "jump_log",
@@ -23,6 +27,8 @@ __all__ = [
     "loop_noise",
     "loop_plant",
     "ramp_kind",
+    "scheme_log",
+    "scheme_run",
 ]
 
 PERIOD = 125e-6  # s, of the velocity controller
@@ -220,3 +226,92 @@ def jump_log(whole: Array, every: int, loop: ga.Cascade, **effects: dict[str, fl
     log = run_drive(axis, whole, effects, encoder=2 * np.pi / 2**20, differenced=True)
     lines = {"velocity": log.velocity, "torque": log.torque, "command": whole}
     return ga.Record(every * PERIOD, **{name: x[::every] for name, x in lines.items()})
+
+
+SCHEMES: dict[str, set[str]] = {
+    "decay": {"integration_rule", "torque_saturation", "anti_windup"},
+    "clamps": {"torque_saturation", "integrator_clamp"},
+    "dead band": {"error_dead_band"},
+    "reset": {"integral_reset"},
+}
+"""Velocity controllers whose integral does what `PI` has no word for -> the findings that say it.
+
+    e = r - w,   u = kp e + I,   clamped to +-L,   T the controller's period
+
+decay       I += ki T e after u; where u is limited, I *= 0.99 instead (ODrive, Firmware/MotorControl/controller.cpp)
+clamps      I trapezoidal, clamped to +-L as the output is (SimpleFOC, src/common/pid.cpp)
+dead band   e = 0 where abs(r - w) is below a width
+reset       I = 0 in a sample in which the command changes its sign
+"""
+DECAY = 0.99  # of the integral that stays in each limited sample
+SCHEME_LIMIT = 0.4  # of the greatest torque that is asked for, where the scheme acts at a limit
+BAND = 0.02  # of the greatest command
+COARSE = 2 * np.pi / 2**17  # rad, an encoder's
+
+
+def matrices(plant: Plant, period: float) -> tuple[Array, Array]:
+    """(F, G) of x(n+1) = F x(n) + G u(n), exact behind a held torque.
+
+    The first state is the motor's velocity [rad/s], the last one its angle [rad].
+    """
+    if plant.two_masses:
+        A = np.array(
+            [
+                [-(plant.D + plant.DG) / plant.J, plant.DG / plant.J, -plant.KG / plant.J, 0.0],
+                [plant.DG / plant.JL, -(plant.DL + plant.DG) / plant.JL, plant.KG / plant.JL, 0.0],
+                [1.0, -1.0, 0.0, 0.0],
+                [1.0, 0.0, 0.0, 0.0],
+            ]
+        )
+    else:
+        A = np.array([[-plant.D / plant.J, 0.0], [1.0, 0.0]])
+    B = np.eye(len(A))[:, :1] / plant.J
+    n = len(A)
+    whole = np.zeros((n + 1, n + 1))
+    whole[:n, :n], whole[:n, n:] = A * period, B * period
+    whole = expm(whole)
+    return whole[:n, :n], whole[:n, n]
+
+
+def scheme_run(plant: Plant, command: Array, scheme: str, size: float, noise: Array | None = None) -> tuple[Array, Array]:
+    """(velocity that the controller reads [rad/s], torque [N m]) at the controller's samples.
+
+    size: the torque limit [N m], or the width of the dead band [rad/s]. noise [rad/s] is on what the controller reads.
+    """
+    period = plant.dt / plant.log_every
+    F, G = matrices(plant, period)
+    kp, ki = plant.kp, plant.ki
+    x, integral, before, asked = np.zeros(len(G)), 0.0, 0.0, 0.0
+    limit = size if scheme in ("decay", "clamps") else np.inf
+    velocity, torque = np.empty(len(command)), np.empty(len(command))
+    for n, r in enumerate(command):
+        w = x[0] + (0.0 if noise is None else noise[n])
+        e = r - w
+        if scheme == "dead band" and abs(e) < size:
+            e = 0.0
+        if scheme == "reset" and r * asked < 0.0:
+            integral = 0.0
+        if scheme != "decay":
+            integral += 0.5 * ki * period * (e + before)
+        if scheme == "clamps":
+            integral = min(max(integral, -limit), limit)
+        u = kp * e + integral
+        limited = min(max(u, -limit), limit)
+        if scheme == "decay":
+            integral = DECAY * integral if limited != u else integral + ki * period * e
+        velocity[n], torque[n] = w, limited
+        before, asked = e, r if r else asked
+        x = F @ x + G * limited
+    return velocity, torque
+
+
+def scheme_log(plant: Plant, command: Array, scheme: str, seed: int) -> ga.Record:
+    """The log of one run, with white noise on the velocity or that of a differenced encoder's angle, in turn."""
+    rng = np.random.default_rng(seed)
+    period = plant.dt / plant.log_every
+    noise = rng.standard_normal(len(command)) * (0.1 if seed % 2 else COARSE / np.sqrt(6.0) / period)
+    free = np.abs(scheme_run(plant, command, "", np.inf)[1]).max()
+    size = SCHEME_LIMIT * free if scheme in ("decay", "clamps") else BAND * float(np.abs(command).max())
+    velocity, torque = scheme_run(plant, command, scheme, size, noise)
+    every = plant.log_every
+    return ga.Record(plant.dt, command=command[::every], velocity=velocity[::every], torque=torque[::every], name=scheme)

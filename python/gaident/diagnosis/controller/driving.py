@@ -20,7 +20,8 @@ from gaident.diagnosis.controller.form_findings import Loop, driver_of
 from gaident.diagnosis.controller.limit_not_given import by_a_limit
 from gaident.diagnosis.controller.log_shift import Aligned, aligned
 from gaident.diagnosis.controller.measured_lag import Lag, commanded, lag_shown
-from gaident.diagnosis.controller.other_form import other_form
+from gaident.diagnosis.controller.other_form import other_form, other_scheme
+from gaident.diagnosis.controller.wrong_number import closer_form, with_findings, wrong_numbers
 from gaident.diagnosis.unlogged.other_gains import OTHER_GAINS, OtherGains
 from gaident.diagnosis.unlogged.unlogged_form import UnloggedForm
 from gaident.identification.logged_torque import comparable, corrected, not_followed
@@ -46,6 +47,7 @@ class Driving:
     logged; the records then contain the one before it. found: the controller's numbers that the records show.
     outliers: digest of a record as given -> lines whose velocity stands in the log alone, interpolated here.
     clocked: whether the sample time of the controller was given. left_open: whether some of its numbers were not.
+    simulated: whether a simulated loop can have the controller.
     """
 
     moved: Aligned
@@ -62,6 +64,7 @@ class Driving:
     outliers: Mapping[str, NDArray[np.intp]] = field(default_factory=dict)
     clocked: bool = False
     left_open: bool = False
+    simulated: bool = True
 
     def regained(self, other: OtherGains) -> Driving:
         """The same under other gains, which command and velocity show where no torque is logged; a finding says so."""
@@ -154,17 +157,22 @@ def driving_of(
     if form is None:
         notes = (*(asked.notes or asked.numbers.trusted().notes), *notes)
         if doubts and pi is None and controller is not None and not numbers:
+            later = [origin.get(r.digest, r) for r in validation]
             other = corrected(whole, controller)
             limited = other is None and by_a_limit(whole, controller)
             if limited:
                 moved = aligned(records, validation, None, True)
-            if other is not None:
+            elif not asked.findings:  # a form that a bare PI lacked was found already
+                form = closer_form(whole, other_form(whole, later, controller), other)
+            if driven.slower and not limited and form is None and other is None:
+                form = other_scheme(whole, later, controller, asked.findings)
+            if other is not None and form is None:
+                other = with_findings(other)
+                findings = (*findings, *wrong_numbers(whole, controller, other))
                 controller, numbers, notes, doubts = other.controller, other.estimates, (*notes, *doubts, other.note), ()
                 found = other.found
                 records, validation, origin = _again(records, validation, origin, partial(driven_by, controller=controller))
                 moved = aligned(records, validation, None, True)
-            elif not limited and not asked.findings:  # a form that a bare PI lacked was found already
-                form = other_form(whole, [origin.get(r.digest, r) for r in validation], controller)
     if form is not None:
         controller, pi, notes, doubts = form.controller, None, (*notes, *form.notes), ()
         findings, numbers, found = form.findings, form.estimates, form.found
@@ -182,7 +190,8 @@ def driving_of(
     # A torque that the law makes once channels are moved needs no other sample time.
     if pi is None or any(replay(r, pi).follows is False for r in records if r.digest not in moved.shifts):
         notes = (*asked.period_notes, *notes)
-    return Driving(moved, used, logged, findings, notes, doubts, numbers, limited, lag=lag, found=found)
+    simulated = form is None or form.simulated
+    return Driving(moved, used, logged, findings, notes, doubts, numbers, limited, lag=lag, found=found, simulated=simulated)
 
 
 def _again(

@@ -11,7 +11,8 @@ from gaident.control.cascade import Cascade
 from gaident.control.filters import LowPass
 from gaident.control.found import FoundNumbers, loosened
 from gaident.control.pi import PI, RULES
-from gaident.diagnosis.controller.form_regression import Law, Shape, at_places
+from gaident.diagnosis.controller.form_filters import at_places
+from gaident.diagnosis.controller.form_regression import Law, Shape
 
 __all__ = [
     "FEEDS",
@@ -66,9 +67,12 @@ class Form:
         names += ["command_weight"] * (self.weight != "one")
         return (*names, *self.feeds, *dict.fromkeys(FILTER_NAMES[place] for place, _ in shape.places))
 
-    def constraints(self, given: PI, records: int) -> tuple[Vector, Matrix]:
+    def constraints(self, given: PI, law: Law) -> tuple[Vector, Matrix]:
         """(P0, D) of the numbers P = P0 + D z in (kp, kp b, ki, a_ff, f_ff, starts)."""
-        fixed = np.zeros(FIRST_FEED + len(FEEDS) + records)
+        fixed = np.zeros(FIRST_FEED + len(FEEDS) + len(law.lengths))
+        if law.around is not None:
+            fed = [0.0 if name in self.feeds else float(getattr(law.around, name)) for name in FEEDS]
+            fixed[FIRST_FEED : FIRST_FEED + len(FEEDS)] = fed
         unit = np.eye(len(fixed))
         moved: list[Vector] = []
         if "kp" in self.free:
@@ -155,7 +159,7 @@ def controller_of(best: FormCandidate, numbers: Vector, filters: Vector, given: 
         command_weight=kp_b / kp if kp else 1.0,
     )
     feeds = {name: float(numbers[FIRST_FEED + FEEDS.index(name)]) for name in best.form.feeds}
-    return Cascade(pi, **feeds, **at_places(best.shape.places, filters, period))  # type: ignore[arg-type]
+    return best.law.whole(pi, **feeds, **at_places(best.shape.places, filters, period))
 
 
 def found_of(

@@ -17,7 +17,8 @@ from gaident.control.pi import PI
 from gaident.control.ticks import pushed_between
 from gaident.data.record import Record
 from gaident.data.torque_kind import MEAN
-from gaident.diagnosis.controller.form_regression import Law, Place, Shape, fitted_shape, grid_of, solved_shape
+from gaident.diagnosis.controller.form_filters import Place, grid_of
+from gaident.diagnosis.controller.form_regression import Law, Shape, fitted_shape, solved_shape
 from gaident.diagnosis.controller.lost_times import LostTimes
 from gaident.identification.replay.line_steps import LineSteps
 from gaident.identification.replay.timed_record import TimedRecord

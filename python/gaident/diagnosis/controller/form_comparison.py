@@ -20,22 +20,14 @@ from gaident.control.between import Unsure
 from gaident.control.pi import PI, RULES
 from gaident.diagnosis.controller.form import FEEDS, FIRST_FEED, KI, KP_R, KP_W, WEIGHTS, Form, FormCandidate
 from gaident.diagnosis.controller.form_between import about, cost_of_left, on_samples, shape_between
-from gaident.diagnosis.controller.form_regression import (
-    FILTER_SETS,
-    FILTER_SETS_OF_ONE,
-    Law,
-    Shape,
-    bounds_of,
-    fitted_shape,
-    least,
-    slope,
-)
+from gaident.diagnosis.controller.form_filters import FILTER_SETS, FILTER_SETS_OF_ONE, bounds_of
+from gaident.diagnosis.controller.form_regression import Law, Shape, fitted_shape, least, slope
 from gaident.estimation.criterion import bic, cost_of
 from gaident.estimation.projection import inverse_of
 from gaident.identification.replay.causes import white_noise
 from gaident.policy.table import POLICY
 
-__all__ = ["Fitted", "compared", "fitted_form", "fitted_with_times", "gains_of", "rivals_of", "shape_of"]
+__all__ = ["Fitted", "compared", "fitted_form", "fitted_with_times", "gains_of", "least_seen", "rivals_of", "shape_of"]
 
 Vector = NDArray[np.float64]
 Matrix = NDArray[np.float64]
@@ -54,16 +46,25 @@ def compared(law: Law, given: PI, floor: float, unknown: tuple[str, ...], unsure
     for places in FILTER_SETS if law.every == 1 else FILTER_SETS_OF_ONE:
         if followed is not None and len(places) > followed:
             break  # where only rounding or white noise is left, another filter improves nothing
-        if unsure is None:
-            one, shape = law, fitted_shape(law, places, floor)
-        else:
+        if unsure is not None:
             one, shape = shape_between(law, unsure, places, given)
-        least = float(np.hypot(floor, one.unseen(shape)))
+        else:
+            one, shape = law, fitted_shape(law, places, floor)
+            for _ in range(ROUNDS if law.every > 1 else 0):
+                one = one.correlated_as(shape)
+                shape = fitted_shape(one, places, 0.0, [shape.numbers])
+        least = least_seen(one, shape, floor)
         white = one.lost is None and white_noise(shape.left, one.logged)  # with unknown times what is left is white in any case
         if shape.rms <= POLICY.near_rounding * least or white:
             followed = len(places)
         candidates += _candidates(one, shape, given, least, unknown)
     return sorted(candidates, key=lambda c: c.criterion)
+
+
+def least_seen(law: Law, shape: Shape, floor: float) -> float:
+    """Root mean square [N m] below which what such filters leave shows nothing; floor: that of `law_of`."""
+    own = floor if law.every == 1 or law.lost is not None else law.floor
+    return float(np.hypot(own, law.unseen(shape)))
 
 
 def _forms(given: PI, unknown: tuple[str, ...]) -> Iterator[Form]:
@@ -87,7 +88,7 @@ def _candidates(law: Law, shape: Shape, given: PI, floor: float, unknown: tuple[
     for form in _forms(given, unknown):
         if form.starts and law.stretch is not None and (law.every == 1 or law.lost is not None):
             continue  # each stretch has an integral of its own
-        fixed, moved = form.constraints(given, len(law.lengths))
+        fixed, moved = form.constraints(given, law)
         B = form.of_columns(p, law.period)
         M = np.column_stack([linear @ B @ moved, slopes])
         wanted = logged - linear @ B @ fixed
@@ -142,7 +143,7 @@ def _again(best: FormCandidate, law: Law, fitted: Fitted, given: PI) -> tuple[Fo
     """The form fitted again, of another regression, from these numbers on."""
     numbers, filters, _ = fitted
     table = law.columns(best.shape.places, filters) @ best.form.of_columns(len(numbers), law.period)
-    fixed, moved = best.form.constraints(given, len(law.lengths))
+    fixed, moved = best.form.constraints(given, law)
     free = least(table @ moved, law.logged - table @ fixed)[0]
     again = replace(best, law=law, shape=shape_of(best, fitted), free=free)
     return again, fitted_form(again, given)
@@ -174,7 +175,7 @@ def fitted_form(best: FormCandidate, given: PI) -> Fitted:
     from scipy.optimize import least_squares
 
     form, shape, law = best.form, best.shape, best.law
-    fixed, moved = form.constraints(given, len(law.lengths))
+    fixed, moved = form.constraints(given, law)
     B = form.of_columns(len(fixed), law.period)
     m = moved.shape[1]
     size = float(np.sqrt(np.mean(law.logged**2)))
@@ -195,11 +196,7 @@ def fitted_form(best: FormCandidate, given: PI) -> Fitted:
         )
         x = found.x if np.sum(found.fun**2) <= np.sum(off(start) ** 2) else start
     # A weight of exactly 0 was chosen; its deviation is that of a free weight.
-    wide = (
-        form.constraints(given, len(law.lengths))[1]
-        if form.weight != "none"
-        else np.column_stack([moved, np.eye(len(fixed))[KP_R]])
-    )
+    wide = form.constraints(given, law)[1] if form.weight != "none" else np.column_stack([moved, np.eye(len(fixed))[KP_R]])
     table = law.columns(shape.places, x[m:])
     coefficients = B @ (fixed + moved @ x[:m])
     slopes = _slopes(law, Shape(shape.places, x[m:], coefficients, shape.left))

@@ -49,7 +49,10 @@ RULES = {
 
 @dataclass(frozen=True)
 class Driver:
-    """Records whose torque drives the model, because the logged torques show this controller; findings and notes on it."""
+    """Records whose torque drives the model, because the logged torques show this controller; findings and notes on it.
+
+    simulated: whether a simulated loop can have it; else its integral follows a law that no `PI` has.
+    """
 
     records: tuple[Record, ...]
     validation: tuple[Record, ...]
@@ -58,6 +61,7 @@ class Driver:
     notes: tuple[Text, ...]
     estimates: Mapping[str, Estimate]  # of gains that were not given
     found: FoundNumbers | None = None
+    simulated: bool = True
 
 
 def driver_of(

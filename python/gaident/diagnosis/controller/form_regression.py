@@ -11,62 +11,29 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from itertools import combinations, product
-from typing import TypeAlias
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from gaident.control.between import at_lines, at_the_clock
-from gaident.control.cascade import Cascade, Filter
+from gaident.control.between import at_lines
+from gaident.control.cascade import Cascade
 from gaident.control.filtering import filtered
-from gaident.control.filters import LowPass, Notch
 from gaident.control.pi import PI
+from gaident.control.ticks import straight_between
 from gaident.data.record import Record
+from gaident.diagnosis.controller.form_filters import Place, bounds_of, equation_of, filters, grid_of
 from gaident.diagnosis.controller.lost_times import LostTimes
 from gaident.identification.logged_stretches import centred, correlation_of, log_of, numbered, whitened
-from gaident.identification.logged_torque import noise_between
-from gaident.identification.number_ranges import FREQUENCIES, TIME_CONSTANTS, range_of
+from gaident.identification.logged_torque import noise_between, smoothed_again
 from gaident.identification.replay.replay import rounding_of
 from gaident.policy.table import POLICY
 
-__all__ = [
-    "FILTER_SETS",
-    "FILTER_SETS_OF_ONE",
-    "Law",
-    "Place",
-    "Shape",
-    "at_places",
-    "bounds_of",
-    "equation_of",
-    "fitted_shape",
-    "grid_of",
-    "law_of",
-    "least",
-    "quiet_law",
-]
+__all__ = ["Law", "Shape", "fitted_shape", "law_of", "least", "quiet_law", "slope", "solved_shape"]
 
 Vector = NDArray[np.float64]
 Matrix = NDArray[np.float64]
-Place: TypeAlias = tuple[str, type[LowPass] | type[Notch]]
-"""(argument of `Cascade`, kind of filter)."""
-
 FILTER_STEP = 1e-5  # no decision: the step of a difference; of a filter's number
-PLACES: tuple[Place, ...] = (
-    ("torque_filters", LowPass),
-    ("torque_filters", Notch),
-    ("velocity_filters", LowPass),
-    ("command_filters", LowPass),
-)
-FILTER_SETS: tuple[tuple[Place, ...], ...] = tuple(s for k in range(3) for s in combinations(PLACES, k))
-"""None, one, and two filters, the fewer first."""
-FILTER_SETS_OF_ONE = FILTER_SETS[: 1 + len(PLACES)]
-"""What a slower log is searched for: between its lines two filters look like one."""
-
-# Starts of the search: a low pass in samples, a notch as share of the sampling frequency, and its dampings.
-NOTCHES = tuple(product(FREQUENCIES, ((0.1, 0.7), (0.3, 1.5))))
-NUMBERS = {LowPass: ("time_constant",), Notch: ("frequency", "numerator_damping", "denominator_damping")}
-"""Of each filter, searched as ln(tau/T); ln(f T), zn, ln(zd)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,6 +49,9 @@ class Law:
     straight: the velocity straight between its lines [rad/s] (n r,).
     steps: that the velocities of each record are rounded to [rad/s], where r = 1.
     mean: of each record, whether its torque is of means since the line before; () where none is.
+    interpolated: what another velocity between the lines changes of the torque of a bare PI [N m] (n,); None: as `velocities`.
+    around: a given position controller with its feedforward, at whose output `command` is; its velocity controller is not used.
+    fed: then slope and sign of v*, which a feedforward of the torque takes (2, n r).
     lost: where the lines do not tell when the command jumped: steps of the signals are fitted, see `lost_times`.
     """
 
@@ -99,11 +69,18 @@ class Law:
     steps: tuple[float, ...] = ()
     lost: LostTimes | None = None
     mean: tuple[bool, ...] = ()
+    interpolated: Vector | None = None
+    around: Cascade | None = None
+    fed: Matrix | None = None
 
     @property
     def others(self) -> tuple[Law, ...]:
         """The same of a slower log with the velocity straight between the lines, and without correlation, for the uncertainty."""
         return () if self.straight is None else (replace(self, velocity=self.straight), replace(self, rho=0.0))
+
+    def whole(self, pi: PI, **more: Any) -> Cascade:
+        """The controller with this PI, and what stands around it."""
+        return replace(self.around or Cascade(pi), velocity=pi, **more)
 
     def columns(self, places: Sequence[Place], numbers: Vector) -> Matrix:
         """(n used, 5 + records) [-w, r, integral of e by the trapezoidal rule, slope of r, sign of r, starts], filtered."""
@@ -119,10 +96,12 @@ class Law:
         r, w = seen["command_filters"], seen["velocity_filters"]
         half = 0.5 * self.period * np.ones(2)  # no decision: a formula: the trapezoidal rule
         integral = filtered(half, np.array([1.0, -1.0]), (r - w)[None, :], ticks)[0]
-        ends = np.cumsum(ticks) - 1
-        slope = np.append(np.diff(self.command), 0.0) / self.period
-        slope[ends] = 0.0
-        rows: Matrix = np.stack([-w, r, integral, slope, np.sign(self.command)])
+        fed = self.fed
+        if fed is None:
+            slope = np.append(np.diff(self.command), 0.0) / self.period
+            slope[np.cumsum(ticks) - 1] = 0.0
+            fed = np.stack([slope, np.sign(self.command)])
+        rows: Matrix = np.concatenate([np.stack([-w, r, integral]), fed])
         for b, a in torque:
             rows = filtered(b, a, rows, ticks)
         starts = np.repeat(np.eye(len(self.lengths)), self.lengths, axis=1)
@@ -144,6 +123,20 @@ class Law:
             return rows.T[self.used]
         stretch, rho = self.stretch, self.rho
         return np.array([centred(*whitened(row, stretch, rho), False) for row in rows]).T
+
+    @property
+    def floor(self) -> float:
+        """Root mean square [N m] below which what is left of a slower log shows nothing of a bare PI."""
+        assert self.interpolated is not None and self.stretch is not None
+        d, _ = whitened(self.interpolated, self.stretch, self.rho)
+        return POLICY.interpolation * float(np.sqrt(np.mean(d**2)))
+
+    def correlated_as(self, shape: Shape) -> Law:
+        """The same of a slower log, with the correlation from line to line of what these filters and gains leave."""
+        assert self.stretch is not None
+        plain = replace(self, rho=0.0)
+        left = plain.logged - plain.columns(shape.places, shape.numbers) @ shape.coefficients
+        return replace(self, rho=correlation_of(left, self.stretch[self.stretch >= 0]))
 
     def unseen(self, shape: Shape) -> float:
         """Root mean square of the torque that the unknown velocity between the lines may make [N m]; 0 where r = 1.
@@ -177,15 +170,18 @@ class Shape:
         return float(np.sqrt(np.mean(self.left**2)))
 
 
-def law_of(records: Sequence[Record], given: PI, every: int = 1, steps: tuple[float, ...] = ()) -> tuple[Law, float] | None:
+def law_of(
+    records: Sequence[Record], given: PI, every: int = 1, steps: tuple[float, ...] = (), around: Cascade | None = None
+) -> tuple[Law, float] | None:
     """(the regression's data, root mean square that the log's rounding, or what is between its lines, makes of a replay [N m]).
 
     given: its torque limit and gains. steps: that the velocities of each record are rounded to [rad/s], where every is 1, or
-    nothing. None where a signal or too much is missing.
+    nothing. around: of a slower log, a given position controller, see `Law`. None where a signal or too much is missing.
     """
     share = max(POLICY.searched_samples // len(records), 1)
     parts = [rec[:share] for rec in records]
-    if any(r.command is None or r.torque is None for r in parts):
+    read = ("torque", *(("command",) if around is None else around.reads))
+    if any(getattr(r, channel) is None for r in parts for channel in read):
         return None
     lengths = tuple(len(r) for r in parts)
     period = records[0].dt / every
@@ -200,13 +196,14 @@ def law_of(records: Sequence[Record], given: PI, every: int = 1, steps: tuple[fl
         rounded = zip(logged, steps, strict=True)
         floor = max(rounding_of(r, c, given, u, q) for (r, c, u), q in rounded if c is not None and u is not None)
     else:
-        cascade = Cascade(given, period)
+        cascade = replace(around or Cascade(given), velocity=given, period=period)
         logs = [log_of(r, share, cascade, False) for r in records]
         logs = [log.pushed(cascade) if log.mean else log for log in logs]  # the torque shows how the velocity turns at a jump
         stretch = numbered([log.stretch for log in logs])
-        command = np.concatenate([log.command for log in logs])
+        asked = None if around is None else [log.asked(cascade) for log in logs]
+        command = np.concatenate([log.command for log in logs] if asked is None else [one for one, _ in asked])
         smooth = np.concatenate([log.velocity for log in logs])
-        straight = np.concatenate([at_the_clock(log.velocity[::every], every) for log in logs])
+        straight = np.concatenate([straight_between(log.velocity[::every], every) for log in logs])
         used = stretch >= 0
         law = Law(
             command,
@@ -219,14 +216,17 @@ def law_of(records: Sequence[Record], given: PI, every: int = 1, steps: tuple[fl
             stretch,
             straight=straight,
             mean=tuple(log.mean for log in logs),
+            around=around,
+            fed=None if asked is None else np.concatenate([fed for _, fed in asked], axis=1),
         )
         coefficients = np.array([given.kp, given.kp, given.ki, *np.zeros(2 + len(records))])
         off, own = law.of_other(replace(law, velocity=straight), coefficients)
-        law = replace(law, rho=correlation_of(off, own))
-        d, _ = whitened(_at(used, off), stretch, law.rho)
-        floor = POLICY.interpolation * float(np.sqrt(np.mean(d**2)))
-        noise = np.concatenate([noise_between(rec, len(log.velocity), every) for rec, log in zip(records, logs, strict=True)])
-        law = replace(law, velocities=(straight, smooth + noise))
+        pairs = list(zip(records, logs, strict=True))
+        noise = np.concatenate([noise_between(rec, len(log.velocity), every) for rec, log in pairs])
+        again = np.concatenate([smoothed_again(rec, log.velocity, every) for rec, log in pairs])
+        others = straight, smooth + noise, again
+        law = replace(law, rho=correlation_of(off, own), velocities=others, interpolated=_at(used, off))
+        floor = law.floor
     return _with_enough(law, floor)
 
 
@@ -267,45 +267,6 @@ def _at(used: NDArray[np.bool_], values: Vector) -> Vector:
     return whole
 
 
-def filters(places: Sequence[Place], numbers: Vector, period: float) -> list[Filter]:
-    """The filters of what the search moves."""
-    made: list[Filter] = []
-    at = 0
-    for _, kind in places:
-        if kind is LowPass:
-            made.append(LowPass(float(np.exp(numbers[at])) * period))
-            at += 1
-        else:
-            frequency, damping, pole = numbers[at : at + 3]
-            made.append(Notch(float(np.exp(frequency)) / period, max(float(damping), 0.0), float(np.exp(pole))))
-            at += 3
-    return made
-
-
-def at_places(places: Sequence[Place], numbers: Vector, period: float) -> dict[str, tuple[Filter, ...]]:
-    """Argument of `Cascade` -> its filters."""
-    made: dict[str, tuple[Filter, ...]] = {}
-    for (place, _), f in zip(places, filters(places, numbers, period), strict=True):
-        made[place] = (*made.get(place, ()), f)
-    return made
-
-
-def equation_of(f: Filter, period: float) -> tuple[Vector, Vector]:
-    """(b, a) of the digital filter, as `LowPass` and `Notch` define it: s = g (1 - 1/z)/(1 + 1/z), g = w/tan(w T/2)."""
-    if isinstance(f, LowPass):
-        share = -np.expm1(-period / f.time_constant)
-        return np.array([share]), np.array([1.0, share - 1.0])
-    w = 2.0 * np.pi * f.frequency
-    g = w / np.tan(0.5 * w * period)
-
-    def polynomial(damping: float) -> Vector:
-        middle, edge = g * g + w * w, 2.0 * damping * w * g
-        return np.array([middle + edge, 2.0 * (w * w - g * g), middle - edge])
-
-    a = polynomial(f.denominator_damping)
-    return polynomial(f.numerator_damping) / a[0], a / a[0]
-
-
 def fitted_shape(law: Law, places: tuple[Place, ...], enough: float, starts: Sequence[Vector] = ()) -> Shape:
     """The filters' numbers that leave least, from the best of these starts, or of a grid; enough: rms [N m] that ends it."""
     from scipy.optimize import least_squares
@@ -335,23 +296,6 @@ def fitted_shape(law: Law, places: tuple[Place, ...], enough: float, starts: Seq
             break
     assert best is not None
     return best
-
-
-def bounds_of(places: Sequence[Place]) -> tuple[Vector, Vector]:
-    """(lowest, highest) of the filters' numbers."""
-    low, high = np.array([range_of(name, 1.0) for _, kind in places for name in NUMBERS[kind]]).reshape(-1, 2).T
-    return low, high
-
-
-def grid_of(places: Sequence[Place]) -> list[Vector]:
-    """Starts of the filters' numbers."""
-    return [np.concatenate([np.zeros(0), *start]) for start in product(*(_starts(kind) for _, kind in places))]
-
-
-def _starts(kind: type[LowPass] | type[Notch]) -> list[Vector]:
-    if kind is LowPass:
-        return [np.array([np.log(tau)]) for tau in TIME_CONSTANTS]
-    return [np.array([np.log(f), zn, np.log(zd)]) for f, (zn, zd) in NOTCHES]
 
 
 def solved_shape(law: Law, places: tuple[Place, ...], numbers: Vector) -> Shape:

@@ -30,6 +30,7 @@ from gaident.diagnosis.controller.form_comparison import (
     fitted_form,
     fitted_with_times,
     gains_of,
+    least_seen,
     rivals_of,
     shape_of,
 )
@@ -76,18 +77,24 @@ class Shown:
 
 
 def form_shown(
-    records: Sequence[Record], given: PI, unknown: tuple[str, ...] = (), every: int = 1, between: bool = True
+    records: Sequence[Record],
+    given: PI,
+    unknown: tuple[str, ...] = (),
+    every: int = 1,
+    between: bool = True,
+    around: Cascade | None = None,
 ) -> Shown | None:
     """The simplest controller that makes the logged torques; None where none does, or where the given PI makes them.
 
     unknown: gains of `given` that were not given but estimated. every: controller samples to a line of the log.
     between: whether the command may have jumped between the lines, at times that are found with the form.
+    around: the position controller of a slower log, with the feedforwards that were given.
     """
     if given.loop != "sampled" or any(r.dt != records[0].dt for r in records):
         return None
     shown = []
     for steps in velocity_steps(records) if every == 1 else ((),):
-        regression = law_of(records, given, every, steps)
+        regression = law_of(records, given, every, steps, around)
         found = None if regression is None else _form_of(records, given, unknown, *regression, between)
         if found is not None and found.exact:
             return found
@@ -105,7 +112,8 @@ def _form_of(
         return None
     if law.every > 1:
         following = _following(candidates, given, floor)
-        unsure = jumps_of(records, law.every) if between and (following is None or not following.strictly) else None
+        open_times = between and law.around is None and (following is None or not following.strictly)
+        unsure = jumps_of(records, law.every) if open_times else None
         if unsure is not None:
             told = _told(records, given, compared(law, given, floor, unknown, unsure))
             if told is not None:
@@ -175,12 +183,19 @@ class _Following(NamedTuple):
 
 
 def _following(candidates: Sequence[FormCandidate], given: PI, floor: float) -> _Following | None:
-    """The first form that leaves no more than another velocity between the lines could make, or what is negligible; or None."""
-    for best in _simplest_first(candidates):
+    """The first form that leaves no more than another velocity between the lines could make, or what is negligible; or None.
+
+    Where the best one leaves more, the best with other filters that does not: what noise makes behind its filter no number of a
+    form takes away.
+    """
+    first = _simplest_first(candidates)
+    with_filters = list({c.shape.places: c for c in reversed(candidates)}.values())
+    rest = sorted((c for c in with_filters if c not in first), key=lambda c: c.criterion)
+    for best in (*first, *rest):
         law, fitted = best.law, fitted_form(best, given)
-        rms, least = shape_of(best, fitted).rms, float(np.hypot(floor, law.unseen(best.shape)))
+        rms, least = shape_of(best, fitted).rms, least_seen(law, best.shape, floor)
         strictly = rms <= POLICY.near_rounding * least
-        follows = strictly or rms <= POLICY.negligible * float(np.abs(law.torque).max())
+        follows = strictly or (best in first and rms <= POLICY.negligible * float(np.abs(law.torque).max()))
         if follows and not too_fast(controller_of(best, *fitted[:2], given, law.period), law.every * law.period):
             return _Following(best, fitted, strictly)
     return None
@@ -260,7 +275,7 @@ def _with_limit(
     at_limit = limited(records, replace(controller_of(best, numbers, filters, given, law.period), period=law.period))
     if not best.names and not at_limit.gain and (law.lost is None or not best.form.unknown):
         return None
-    plain = Cascade(given, law.period)
+    plain = law.whole(given, period=law.period)
     as_given = records if law.lost is None else timed(records, plain)  # with the times that the given controller would tell
     before, after = run_error(as_given, plain), run_error(records, at_limit.controller)
     size = float(np.std(np.concatenate([r.torque for r in records if r.torque is not None])))
@@ -271,7 +286,11 @@ def _with_limit(
     if at_limit.limit is not None:
         differs[OF_SETTING["torque_limit"]] = {"limit": (at_limit.limit, at_limit.std)}
         gains[OF_SETTING["torque_limit"]] = at_limit.gain
-    if at_limit.windup > 0.0:
+    clamp = at_limit.controller.velocity.integrator_limit
+    if at_limit.windup > 0.0 and clamp is not None:
+        differs[OF_SETTING["integrator_limit"]] = {"limit": (clamp, at_limit.std)}
+        gains[OF_SETTING["integrator_limit"]] = at_limit.windup
+    elif at_limit.windup > 0.0:
         time = at_limit.controller.velocity.tracking_time
         differs[ANTI_WINDUP] = {} if time is None else {"tracking_time": (time, at_limit.time_std)}
         gains[ANTI_WINDUP] = at_limit.windup

@@ -17,13 +17,13 @@ from gaident.control.cascade import Cascade
 from gaident.control.filters import Notch
 from gaident.data.record import Record
 from gaident.data.signals.lattice import rounding_step
-from gaident.diagnosis.controller.form_regression import equation_of
+from gaident.diagnosis.controller.form_filters import equation_of
 from gaident.identification.logged_stretches import centred, log_of, numbered, plateau_of, unlimited, whitened
 from gaident.identification.logged_torque import comparable, not_followed
 from gaident.models.starts import starts_moving
 from gaident.policy.table import POLICY
 
-__all__ = ["Limited", "limited", "run_error", "too_fast"]
+__all__ = ["Limited", "limited", "run_error", "too_fast", "torque_spread"]
 
 Vector = NDArray[np.float64]
 
@@ -100,11 +100,11 @@ def limited(records: Sequence[Record], controller: Cascade) -> Limited:
         return Limited(controller, None, 0.0)
     if in_motion:
         known = replace(controller, velocity=replace(controller.velocity, torque_limit=limit))
-        return Limited(known, limit, _gain(records, controller, known), _spread(records, limit))
+        return Limited(known, limit, _gain(records, controller, known), torque_spread(records, limit))
     best = _closest(records, controller, limit)
     same = replace(controller, velocity=replace(controller.velocity, torque_limit=limit))
     windup, gain = _by_windup(records, same, best), _gain(records, controller, best)
-    return Limited(best, limit, gain, _spread(records, limit), windup, _time_std(records, best) if windup > 0.0 else 0.0)
+    return Limited(best, limit, gain, torque_spread(records, limit), windup, _time_std(records, best) if windup > 0.0 else 0.0)
 
 
 def _by_windup(records: Sequence[Record], given: Cascade, best: Cascade) -> float:
@@ -158,7 +158,7 @@ def _closest(records: Sequence[Record], controller: Cascade, limit: float) -> Ca
     return min((best, with_time(found.x)), key=lambda one: run_error(records, one))
 
 
-def _spread(records: Sequence[Record], limit: float) -> float:
+def torque_spread(records: Sequence[Record], limit: float) -> float:
     """Deviation of the torques at a limit [N m], no less than their rounding makes."""
     torque = np.concatenate([r.torque for r in records if r.torque is not None])
     at_limit = np.abs(torque)[np.abs(torque) >= POLICY.at_limit * limit]
@@ -187,6 +187,7 @@ def before_filters(torque: Vector, controller: Cascade, period: float) -> Vector
 def _schemes(controller: Cascade, limit: float) -> Iterator[Cascade]:
     pi = replace(controller.velocity.winding_up, torque_limit=limit)
     yield replace(controller, velocity=pi)
+    yield replace(controller, velocity=replace(pi, integrator_limit=limit))  # both are clamped alike, as SimpleFOC does
     yield replace(controller, velocity=replace(pi, anti_windup="hold"))
     for time in TIMES:
         yield replace(controller, velocity=replace(pi, anti_windup="tracking", tracking_time=float(time)))

@@ -1,0 +1,296 @@
+"""What an integral may do that no `PI` has: replayed on command and velocity at the controller's clock, no plant is involved.
+
+    e = r - w,   u = kp (b r - w) + I,   clamped to +-L,   T the controller's period, g the rule's share of the newest error
+
+decay       in a sample in which u is limited, I is q times what it was before that sample, 0 <= q <= 1
+            (ODrive: q = 0.99, its decay factor in Firmware/MotorControl/controller.cpp; q = 1: held in every limited sample)
+dead band   abs(e) <= d counts as 0; of a larger error all of it, or what it is beyond d
+reset       I begins at 0 in a sample in which the command changes its sign, or is 0, or in which e changes its sign
+            (the last one: Clegg 1958)
+
+The number is that with the least squares of logged minus made torque at the lines, without its correlation from line to line.
+A law is shown where what is left is no more than what the velocity between the lines can make (`logged_torque.off_by`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gaident.control.cascade import Cascade
+from gaident.control.pi import PI, RULES
+from gaident.control.smoothing import expected_at
+from gaident.control.ticks import straight_between
+from gaident.data.record import Record
+from gaident.data.torque_kind import MEAN
+from gaident.identification.logged_stretches import Log, log_of, plateau_of
+from gaident.identification.logged_torque import comparable, not_followed, off_by
+from gaident.policy.table import POLICY
+
+__all__ = ["DEAD_BAND", "DECAY", "RESET", "Scheme", "SchemeShown", "scheme_shown"]
+
+Vector = NDArray[np.float64]
+
+DECAY, DEAD_BAND, RESET = "decay", "dead band", "reset"
+LOST = np.append(0.0, np.geomspace(1e-4, 0.5, 16))  # no decision: a grid: of 1 - q
+ROUNDS = 2  # no decision: of a solver: how many steps, a third one changes nothing
+BANDS = np.geomspace(1e-4, 0.5, 24)  # no decision: a grid: of the largest error
+
+
+@dataclass(frozen=True)
+class Scheme:
+    """One law; number: q of a decay, d of a dead band [rad/s]; variant: what `VARIANTS` says."""
+
+    kind: str
+    variant: str
+    number: float = 0.0
+
+    def torque(self, pi: PI, command: Vector, velocity: Vector, period: float, noise: Vector) -> Vector:
+        """Of signals at the controller's samples [rad/s] (n,), from rest: the torque there [N m] (n,).
+
+        noise: deviation of what a velocity there lacks of what the controller read [rad/s] (n,).
+        """
+        assert pi.kp is not None and pi.ki is not None and pi.command_weight is not None
+        error = command - velocity
+        if self.kind == DEAD_BAND:
+            error = _outside(error, self.number, self.variant == "beyond", noise)
+        proportional = pi.kp * (error + (pi.command_weight - 1.0) * command)
+        newest = RULES[pi.rule]
+        steps = pi.ki * period * (newest * error + (1.0 - newest) * np.append(0.0, error[:-1]))
+        limit = pi.limits[0]
+        if self.kind == DECAY:
+            return _decaying(proportional, steps, limit, self.number, newest == 0.0)
+        integral = np.cumsum(steps)
+        if self.kind == RESET:
+            begins = np.flatnonzero(_resets(self.variant, command, error))
+            before = np.append(0.0, integral)[begins]
+            lasting = np.diff(np.concatenate([begins, [len(error)]]))
+            integral[begins[0] if len(begins) else len(error) :] -= np.repeat(before, lasting)
+        return np.clip(proportional + integral, -limit, limit)
+
+
+VARIANTS = {DECAY: ("",), DEAD_BAND: ("whole", "beyond"), RESET: ("command reverses", "command is 0", "error reverses")}
+"""Kind -> its variants."""
+
+
+def _outside(error: Vector, width: float, beyond: bool, noise: Vector) -> Vector:
+    """What of an error counts outside of a dead band (n,); where noise of this deviation v is on it, its expectation:
+
+    E(x; x > d) = e (1 - P(a)) + v p(a),   a = (d - e)/v,   P, p: of the standard normal distribution; the other end likewise
+    """
+    from scipy.special import ndtr
+
+    over = error - np.clip(error, -width, width)
+    made: Vector = over if beyond else np.where(over != 0.0, error, 0.0)
+    unsure = noise > 0.0
+    e, v = error[unsure], noise[unsure]
+    above, below = (width - e) / v, (-width - e) / v
+    density = v * (np.exp(-0.5 * above**2) - np.exp(-0.5 * below**2)) / np.sqrt(2.0 * np.pi)
+    lost = width if beyond else 0.0
+    made[unsure] = (e - lost) * ndtr(-above) + (e + lost) * ndtr(below) + density
+    return made
+
+
+def _decaying(proportional: Vector, steps: Vector, limit: float, kept: float, late: bool) -> Vector:
+    """u of an integral of which only a share is kept in each limited sample, whose own error it does not add.
+
+    late: whether each step is the error of the sample before, as where the integral moves behind the torque.
+    """
+    integral, was, made = 0.0, False, []
+    for p, step in zip(proportional.tolist(), steps.tolist(), strict=True):
+        now = integral if late and was else integral + step
+        u = p + now
+        was = u > limit or u < -limit
+        if was:
+            integral = kept * (now if late else integral)
+            made.append(limit if u > limit else -limit)
+        else:
+            integral = now
+            made.append(u)
+    return np.array(made)
+
+
+def _resets(variant: str, command: Vector, error: Vector) -> NDArray[np.bool_]:
+    if variant == "command is 0":
+        return np.asarray(command == 0.0)
+    signal = command if variant == "command reverses" else error
+    sign = np.sign(signal)
+    at = np.maximum.accumulate(np.where(sign != 0.0, np.arange(len(sign)), 0))
+    last = sign[at]  # of the last value that is not 0
+    return np.append(False, last[1:] * last[:-1] < 0.0)
+
+
+@dataclass(frozen=True)
+class SchemeShown:
+    """A law from which the logged torques follow, beside these gains, rule and limit.
+
+    std: of its number. samples: lines that were compared. before, left: rms of logged minus made torque [N m], of the given
+    controller, or with what a `PI` has at that limit, and with the law.
+    """
+
+    scheme: Scheme
+    controller: Cascade
+    std: float
+    before: float
+    left: float
+    samples: int
+
+    def made(self, rec: Record) -> Vector:
+        """The torque at the controller's samples [N m] (n r,)."""
+        return _made(self.scheme, self.controller, _log_of(rec, self.controller))
+
+
+def scheme_shown(records: Sequence[Record], controller: Cascade) -> SchemeShown | None:
+    """The law beside a velocity controller without filters and feedforward that makes the torques of a slower log; or None.
+
+    What `PI` has is not looked for: its integral is not held or tracked, and has no clamp of its own.
+    """
+    pi = replace(controller.velocity.winding_up, integrator_limit=None)
+    bare = Cascade(pi, controller.period, delay=controller.delay)
+    plain = replace(controller, velocity=replace(pi, torque_limit=controller.velocity.torque_limit)) == bare
+    if (
+        not plain
+        or not not_followed(records, controller)
+        or any(r.torque_log == MEAN or not comparable(r, bare) for r in records)
+    ):
+        return None
+    if pi.torque_limit is None:
+        plateau = plateau_of(np.concatenate([np.abs(r.torque) for r in records if r.torque is not None]))
+        pi = replace(pi, torque_limit=plateau if np.isfinite(plateau) else None)
+        bare = replace(bare, velocity=pi)
+    logs = [_log_of(r, bare) for r in records]
+    at_limit = [] if pi.torque_limit is None else [replace(pi, anti_windup="hold")]
+    known = [controller, bare, *(replace(bare, velocity=one) for one in at_limit)]
+    before = min(_rms([log.torque - log.made(one) for log in logs]) for one in known)
+    found = min((_fitted(logs, kind, variant, bare) for kind, variant in _kinds(pi)), key=lambda one: one[0], default=None)
+    if found is None:
+        return None
+    left, scheme = found
+    for rule in [rule for rule in RULES if rule != pi.rule]:
+        other = replace(bare, velocity=replace(pi, rule=rule))
+        again = _fitted(logs, scheme.kind, scheme.variant, other)
+        if again[0] < POLICY.each_number * left:
+            (left, scheme), bare = again, other
+    scheme, std = _number(logs, scheme, bare)
+    left = _rms(_left(logs, scheme, bare))
+    follows = all(
+        off_by(rec, log, bare, lambda one, straight: _made(scheme, bare, one, straight)[:: _every(one)]) == 0.0
+        for rec, log in zip(records, logs, strict=True)
+    )
+    if not follows or not left < POLICY.each_number * before:
+        return None
+    return SchemeShown(scheme, bare, std, before, left, sum(len(log.torque) for log in logs))
+
+
+def _kinds(pi: PI) -> Iterator[tuple[str, str]]:
+    """What may be: an integral decays at a limit only."""
+    for kind, variants in VARIANTS.items():
+        if kind != DECAY or pi.torque_limit is not None:
+            yield from ((kind, variant) for variant in variants)
+
+
+def _log_of(rec: Record, controller: Cascade) -> Log:
+    return log_of(rec, len(rec), controller, True).pushed(controller)
+
+
+def _every(log: Log) -> int:
+    return len(log.velocity) // len(log.source)
+
+
+def _made(scheme: Scheme, controller: Cascade, log: Log, straight: bool = False) -> Vector:
+    """The torque at the controller's samples [N m] (n r,)."""
+    every = _every(log)
+    line = log.velocity[::every]
+    velocity = straight_between(line, every) if straight else log.velocity
+    noise = np.full(len(velocity), float(np.std(line - expected_at(line))))
+    noise[::every] = 0.0  # a line has what the controller read
+    return scheme.torque(controller.velocity, log.command, velocity, log.dt / every, noise)
+
+
+def _fitted(logs: Sequence[Log], kind: str, variant: str, controller: Cascade) -> tuple[float, Scheme]:
+    """(rms of logged minus made torque [N m], the law with the number that leaves least)."""
+
+    def left(number: float) -> float:
+        return _rms(_left(logs, Scheme(kind, variant, number), controller))
+
+    if kind == RESET:
+        return left(0.0), Scheme(kind, variant)
+    if kind == DECAY:
+        return _least(lambda lost: left(1.0 - lost), LOST, lambda lost: Scheme(kind, variant, 1.0 - lost))
+    largest = max(float(np.abs(log.command - log.velocity).max()) for log in logs)
+    return _least(left, BANDS * largest, lambda width: Scheme(kind, variant, width))
+
+
+def _number(logs: Sequence[Log], scheme: Scheme, controller: Cascade) -> tuple[Scheme, float]:
+    """(the law with its number by c(k) = d(k) - rho d(k-1), d: logged minus made torque, its deviation).
+
+    What the velocity did between the lines adds up in d (Cochrane and Orcutt 1949).
+    scheme: with the number that leaves least without rho.
+    The deviation contains what a velocity that goes straight between the lines, another rule of integration, and no correlation
+    would change.
+    """
+    if scheme.kind == RESET:
+        return scheme, 0.0
+    rho, uncorrelated = 0.0, scheme.number
+
+    def of(number: float) -> Scheme:
+        return replace(scheme, number=number)
+
+    def nearest(beside: Cascade) -> Scheme:
+        def error(number: float) -> float:
+            return _rms([d[1:] - rho * d[:-1] for d in _left(logs, of(number), beside)])
+
+        grid = scheme.number + _step(scheme) * np.linspace(-20.0, 20.0, 41)  # no decision: a grid
+        return _least(error, np.clip(grid, 0.0, 1.0) if scheme.kind == DECAY else grid, of)[1]
+
+    for _ in range(ROUNDS):
+        left = _left(logs, scheme, controller)
+        power = sum(float(d @ d) for d in left)
+        together = sum(float(d[1:] @ d[:-1]) for d in left)
+        rho = float(np.clip(together / power, 0.0, 1.0)) if power > 0.0 else 0.0
+        scheme = nearest(controller)
+    others = [replace(controller, velocity=replace(controller.velocity, rule=rule)) for rule in RULES]
+    by_rule = max(abs(nearest(other).number - scheme.number) for other in others)
+
+    def made(by: float = 0.0, straight: bool = False) -> Vector:
+        torques = (_made(of(scheme.number + by), controller, log, straight)[:: _every(log)] for log in logs)
+        return np.concatenate([u[1:] - rho * u[:-1] for u in torques])
+
+    step, here = _step(scheme), made()
+    slope = (made(step) - made(-step)) / (2.0 * step)
+    power = float(slope @ slope)
+    if not power > 0.0:
+        return scheme, float("inf")
+    straight = float(slope @ (made(straight=True) - here)) / power
+    left_of = _rms([d[1:] - rho * d[:-1] for d in _left(logs, scheme, controller)])
+    return scheme, float(np.sqrt(left_of**2 / power + straight**2 + by_rule**2 + (scheme.number - uncorrelated) ** 2))
+
+
+def _step(scheme: Scheme) -> float:
+    """A small part of its number, or of what a decay loses: the step of a difference."""
+    lost = max(1.0 - scheme.number, LOST[1]) if scheme.kind == DECAY else scheme.number
+    return 1e-2 * lost  # no decision: the step of a difference
+
+
+def _least(error: Callable[[float], float], grid: Vector, made: Callable[[float], Scheme]) -> tuple[float, Scheme]:
+    """The best of a grid, and the minimum between its neighbours."""
+    from scipy.optimize import minimize_scalar
+
+    values = [error(float(x)) for x in grid]
+    best = int(np.argmin(values))
+    low, high = grid[max(best - 1, 0)], grid[min(best + 1, len(grid) - 1)]
+    # no decision: of a solver
+    found = minimize_scalar(error, bounds=(low, high), method="bounded", options={"xatol": 1e-6 * (high - low)})
+    return min((values[best], made(float(grid[best]))), (float(found.fun), made(float(found.x))), key=lambda one: one[0])
+
+
+def _left(logs: Sequence[Log], scheme: Scheme, controller: Cascade) -> list[Vector]:
+    """Logged minus made torque at the lines [N m]."""
+    return [log.torque - _made(scheme, controller, log)[:: _every(log)] for log in logs]
+
+
+def _rms(parts: Sequence[Vector]) -> float:
+    return float(np.sqrt(np.mean(np.concatenate(parts) ** 2)))

@@ -1,0 +1,79 @@
+"""Laws of an integral that `PI` has no word for, from slow logs of a controller that has them."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+
+import gaident as ga
+from drive_rig import Plant
+from gaident.diagnosis.controller.form_findings import loop_of
+from gaident.diagnosis.controller.other_form import other_scheme
+from gaident.identification.replay.integral_schemes import scheme_shown
+from loop_cases import BAND, DECAY, PERIOD, scheme_log
+
+GIVEN = ga.Cascade(ga.PI(0.03, 2.0), PERIOD)
+
+
+@cache
+def log(scheme: str) -> ga.Record:
+    """1500 lines of one mass, each the 4th sample, under levels with reversals, some at rest."""
+    rng = np.random.default_rng(5)
+    axis = Plant(J=2.5e-4, D=1.5e-3, kp=0.03, ki=2.0, dt=4 * PERIOD, cascade=GIVEN)
+    levels = rng.uniform(5.0, 60.0, 15) * np.resize([1.0, -1.0, 0.0], 15)
+    command = np.repeat(levels, 100) + np.repeat(rng.choice([-1.0, 1.0], 150), 10)
+    command[:20] = 0.0
+    return scheme_log(axis, np.repeat(command, 4), scheme, 1)
+
+
+def test_a_decay_for_each_limited_sample() -> None:
+    rec = log("decay")
+    shown = scheme_shown([rec], GIVEN)
+    assert shown is not None and shown.scheme.kind == "decay"
+    assert abs(shown.scheme.number - DECAY) < 4.0 * shown.std < 0.01
+    driver = other_scheme([rec], [], GIVEN, ())
+    assert driver is not None and not driver.simulated
+    named = {f.effect: f.parameters for f in driver.findings}
+    assert {"torque_saturation", "anti_windup"} <= set(named) and "kept" in named["anti_windup"]
+    assert all(f.place == "controller" for f in driver.findings)
+
+
+def test_a_clamp_of_integral_and_output_alike() -> None:
+    found = loop_of([log("clamps")], GIVEN)
+    assert {f.effect for f in found.findings} == {"torque_saturation", "integrator_clamp"}
+    limit, clamp = (f.parameters["limit"].value for f in found.findings)
+    assert limit == clamp == pytest.approx(float(np.abs(log("clamps").torque).max()))
+
+
+def test_a_dead_band_on_the_error() -> None:
+    rec = log("dead band")
+    driver = other_scheme([rec], [rec], GIVEN, ())
+    assert driver is not None and [f.effect for f in driver.findings] == ["error_dead_band"]
+    width = driver.findings[0].parameters["width"]
+    true = BAND * float(np.abs(rec.command).max())  # no error at a line lies between it and what is found
+    assert abs(width.value - true) < 4.0 * width.std < 0.1 * true
+    assert "counts as 0" in driver.findings[0].evidence and len(driver.records) == len(driver.validation) == 1
+
+
+def test_an_integral_that_is_reset() -> None:
+    driver = other_scheme([log("reset")], [], GIVEN, ())
+    assert driver is not None and [f.effect for f in driver.findings] == ["integral_reset"]
+    assert "begins at 0 wherever the command changes its sign" in driver.findings[0].evidence
+
+
+def test_nothing_is_found_where_the_controller_is_another_one() -> None:
+    assert scheme_shown([log("dead band")], replace(GIVEN, torque_filters=(ga.LowPass(5e-4),))) is None
+    assert scheme_shown([log("dead band")], replace(GIVEN, velocity=ga.PI(0.045, 3.0))) is None
+    rec = log("")  # the given controller itself
+    assert scheme_shown([rec], GIVEN) is None
+
+
+def test_a_diagnosis_names_the_law_and_no_mechanics() -> None:
+    dia = ga.diagnose(log("dead band"), GIVEN)
+    assert [f.effect for f in dia.causes] == ["error_dead_band"] and dia.verdict == "explained"
+    assert dia.mechanics["inertia"].value == pytest.approx(2.5e-4, rel=5e-3) and not dia.loop_follows
+    assert any("the torque that it makes between the lines drives the models" in note for note in dia.notes)
+    assert "error dead band" in dia.summary()
