@@ -36,7 +36,8 @@ def responses_of(args: argparse.Namespace) -> list[FrequencyResponse]:
     """Those that the options name."""
     from gaident.data.frequency.read_response import read_response
 
-    columns = _assignments(args.response_columns, "--response-columns", list(COLUMNS))
+    named = _assignments(args.response_columns, "--response-columns", list(COLUMNS))
+    columns = {key: f"#{name}" if name.isdigit() else name for key, name in named.items()}
     units = _assignments(args.response_units, "--response-units", list(UNITS))
     return [
         read_response(file, columns, units, args.response_kind, args.response_dt, scale=args.response_scale)

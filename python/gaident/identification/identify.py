@@ -294,7 +294,7 @@ class RecordSearch(StructureSearch):
         """Noise of the measured velocity as its third differences show it [rad/s]."""
         return math.sqrt(sum(len(r) * noise_std(r.velocity) ** 2 for r in self.records) / self.samples)
 
-    def notes(self) -> Sequence[str]:
+    def notes(self, best: Assessed) -> Sequence[str]:
         """See `StructureSearch`."""
         of_responses = [note for w in self.weighed for note in w.response.notes]
         return [*record_notes(self.records, self.controller, self.settings.initial_state), *of_responses]

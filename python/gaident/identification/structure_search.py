@@ -93,8 +93,8 @@ class StructureSearch(ABC):
         """What the report says of the data: rmse, fit_percent, samples, digests, initial_states, records, responses."""
 
     @abstractmethod
-    def notes(self) -> Sequence[str]:
-        """What is doubtful about the data themselves."""
+    def notes(self, best: Assessed) -> Sequence[str]:
+        """What is doubtful about the data themselves, and about the model for such data."""
 
     def search(self, trials: int, seed: int, progress: ProgressCallback | None) -> list[_core.Trial]:
         """The genetic runs."""
@@ -209,7 +209,7 @@ class StructureSearch(ABC):
             structures=tuple(Structure(c.p, c.q, c.cost, c.bic - lowest) for c in scored),
             trials=tuple(self.outcome(t) for t in found),
             adequacy=verdict,
-            warnings=warnings_of(verdict, parameters, mechanics, rivals, model, closer, self.notes()),
+            warnings=warnings_of(verdict, parameters, mechanics, rivals, model, closer, self.notes(best)),
             space=self.space,
             settings=s,
             seed=seed,

@@ -85,11 +85,12 @@ class Adequacy:
     @property
     def _of_response(self) -> str:
         if self.falsified:
+            large = f" and is {self.excess:.3g} times the stated deviations" if self.excess != 1.0 else ""
             return (
                 "The linear model is falsified: what it leaves of the frequency response goes on from frequency to frequency "
-                f"(p = {self.white_p:.1g}) and is {self.excess:.3g} times the stated deviations. "
-                "Do not trust the mechanical parameters; something is missing: another mass, a lag, a delay, or an axis that is "
-                "not linear."
+                f"(p = {self.white_p:.1g}){large}. "
+                "Do not trust the mechanical parameters; something is missing: another mass, a lag, a delay, an axis that is not "
+                "linear, or a record beside it that is of another axis or in other units."
             )
         if self.white_p < POLICY.test_level:
             return (

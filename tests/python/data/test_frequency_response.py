@@ -107,6 +107,25 @@ def test_rows_at_standstill_and_beyond_the_sampling_are_left_out_and_said(tmp_pa
     assert len(fr) == 40 and len(fr.notes) == 2 and "0 Hz" in fr.notes[0] and "half the sampling" in fr.notes[1]
 
 
+def test_a_row_at_standstill_may_have_no_number_and_other_units_name_the_scale(tmp_path: Path) -> None:
+    decibel, phase = 20.0 * np.log10(np.abs(G)), np.degrees(np.angle(G))
+    file = table(
+        tmp_path / "a.csv", "f [Hz],magnitude [dB],phase [deg]", np.r_[0.0, F], np.r_[-np.inf, decibel], np.r_[0.0, phase]
+    )
+    assert len(ga.read_response(file)) == 40
+    rpm = table(tmp_path / "b.csv", "f [Hz],real [rpm/Nm],imag [rpm/Nm]", F, G.real * 30 / np.pi, G.imag * 30 / np.pi)
+    with pytest.raises(ReadError, match=r"is in 'rpm/Nm'.*scale.*pi/30"):
+        ga.read_response(rpm)
+    share = table(tmp_path / "c.csv", "f [Hz],real,imag,std [%]", F, G.real, G.imag, 0 * F + 1.0)
+    with pytest.raises(ReadError, match="std in column"):
+        ga.read_response(share)
+    turned = table(tmp_path / "d.csv", "f [Hz],real,imag", F, -G.real, -G.imag)
+    np.testing.assert_allclose(ga.read_response(turned, scale=-1.0).response, G, rtol=1e-6)
+    twice = table(tmp_path / "e.csv", "f [Hz],real,imag", np.r_[F, F[-1]], np.r_[G, G[-1]].real, np.r_[G, G[-1]].imag)
+    with pytest.raises(ReadError, match=r"e\.csv: frequency_hz\[40\]"):
+        ga.read_response(twice)
+
+
 DT, LOOP = 1e-3, ga.PI(kp=0.02, ki=0.4)
 DRIVE = ga.TwoMass(JM=2e-4, DM=1e-3, JL=3e-4, DL=1e-3, KG=12.0, DG=2e-3).model()
 
@@ -148,7 +167,20 @@ def test_without_periods_local_polynomials_have_deviations_that_hold() -> None:
     assert (idn.p, idn.q) == (1, 2) and pytest.approx(2e-4, rel=0.03) == idn.mechanics.with_shaft_damping.JM
 
 
+def test_a_multisine_of_few_lines_has_a_deviation_for_each() -> None:
+    n, lines = 1000, np.unique(np.rint(np.geomspace(3, 400, 9)).astype(int))
+    torque = np.tile(sum(np.cos(2 * np.pi * k * np.arange(n) / n + k * k) for k in lines), 6)
+    still = ga.Record(DT, torque=torque, velocity=0.0 * torque)
+    noise = 0.1 * np.random.default_rng(5).standard_normal(len(torque))
+    fr = ga.frequency_response(ga.Record(DT, torque=torque, velocity=ga.simulate(DRIVE, still) + noise))
+    assert len(fr) == 9 and np.all(fr.std > 0.0)
+
+
 def test_records_that_show_none_are_refused() -> None:
+    slow = ga.Cascade(LOOP, period=DT / 4)
+    stepped = record(np.repeat([1.0, -1.0, 2.0, 0.0], 500), 0.1)
+    with pytest.raises(RecordError, match="slower than its controller"):
+        ga.frequency_response(stepped, slow)
     still = np.ones(2000)
     with pytest.raises(RecordError, match="command of this loop never changes"):
         ga.frequency_response(record(still, 0.1), LOOP)

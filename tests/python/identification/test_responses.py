@@ -179,6 +179,36 @@ def test_what_is_made_of_it(tmp_path: Path) -> None:
     assert "explains the frequency response" in page and fr.digest in page
 
 
+def test_a_rigid_axis_has_no_peak_that_moves() -> None:
+    g = 1.0 / (2j * np.pi * F * 2e-3 + 0.01)
+    for seed in range(20, 28):
+        parts = [ga.FrequencyResponse(F, noisy(g, 0.01, seed + 100 * k), 0.01 * np.abs(g), amplitude=0.1 + k) for k in (0, 1)]
+        assert not [w for w in ga.identify(parts).warnings if w.startswith("Not linear")]
+
+
+def test_exact_numbers_are_not_falsified_by_their_rounding() -> None:
+    for g in (1.0 / (2j * np.pi * F * 1e-3 + 0.01), exact()):
+        idn = ga.identify(ga.FrequencyResponse(F, g))
+        assert (idn.p, idn.q) in ((1, 0), (1, 2)) and not idn.falsified and idn.delay is None
+
+
+def test_few_frequencies_behind_a_delay_are_no_chain_that_gives_power() -> None:
+    """Nineteen frequencies have no power against a chain that turns the delay into masses; physics has."""
+    f = np.geomspace(7.0, 475.0, 19)
+    idn = ga.identify(ga.FrequencyResponse(f, noisy(exact(f) * np.exp(-2j * np.pi * f * 0.3e-3), 0.001, 21)))
+    assert (idn.p, idn.q, idn.falsified) == (1, 2, False)
+    assert idn.delay is not None and idn.delay.value == pytest.approx(0.3e-3, rel=0.01)
+    assert pytest.approx(JM, rel=0.01) == idn.mechanics.with_shaft_damping.JM
+    assert not any("gives power" in w for w in idn.warnings)
+
+
+def test_a_sensor_at_the_load_is_said_to_be_no_chain() -> None:
+    A, B, _ = state_space()
+    g = np.array([(np.linalg.solve(2j * np.pi * f * np.eye(3) - A, B))[1] for f in F])  # the load's velocity
+    idn = ga.identify(ga.FrequencyResponse(F, noisy(g, 0.01, 22)))
+    assert idn.mechanics is None or any("gives power" in w for w in idn.warnings)
+
+
 @pytest.mark.parametrize(("turn", "remedy"), [(np.negative, "give -response"), (np.conj, r"numpy\.conj")])
 def test_a_response_of_another_sign_is_refused_with_the_remedy(turn: np.ufunc, remedy: str) -> None:
     g = noisy(exact(), 0.01, 20)

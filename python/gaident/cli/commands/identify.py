@@ -23,6 +23,8 @@ def identify_command(args: argparse.Namespace) -> None:
     drive = drive_of(args)
     if not args.logs and not args.response:
         raise SettingsError("there is no LOG: give a log file, or a measured frequency response with --response FILE")
+    if not args.logs and args.kp is not None:
+        raise SettingsError("--kp: a frequency response is that of the axis from its torque, in any loop; leave it out")
     files = ResultFiles.of(args, [*args.logs, *args.response])
     controller = drive.controller() if args.logs else None  # a response is that of the axis, whatever the loop
     settings = Settings.paper() if args.paper else Settings()

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-__all__ = ["COLUMNS", "KINDS", "UNITS"]
+__all__ = ["COLUMNS", "KINDS", "SI", "UNITS"]
 
 KINDS = {"torque to velocity": 0, "torque to position": 1, "torque to acceleration": -1}
 """Kinds of response, and how often they are differentiated in time to be one of the velocity."""
@@ -28,3 +28,6 @@ UNITS: dict[str, dict[str, float]] = {
     "coherence": {"1": 1.0, "%": 0.01},  # no decision: a unit
 }
 """Factor to Hz, 1, rad and 1; nan: decibels."""
+
+SI = ("", "1", "rad/s/nm", "rad/snm", "m/s/n", "m/sn", "rad/nm", "m/n", "rad/s^2/nm", "rad/s2/nm", "m/s^2/n", "m/s2/n")
+"""Units of a response that need no scale, without spaces and brackets."""

@@ -6,18 +6,19 @@ import math
 import os
 import re
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gaident.arguments import arg
-from gaident.checks import above_zero, checked_path, known_keys
+from gaident.checks import checked_path, known_keys, real_number
 from gaident.data.formats.delimited import TextOptions, open_text
 from gaident.data.formats.table import Column, LogTable
-from gaident.data.frequency.columns import COLUMNS, UNITS
+from gaident.data.frequency.columns import COLUMNS, SI, UNITS
 from gaident.data.frequency.response import FrequencyResponse
-from gaident.errors import ReadError
+from gaident.errors import ReadError, RecordError
 
 __all__ = ["read_response"]
 
@@ -60,6 +61,7 @@ def read_response(
         Sample time [s] of a measurement by a drive, see `FrequencyResponse`.
     scale : float
         What 1 of the file is in rad/s/(N m) (m/s/N; or rad, rad/s^2 per N m, by `kind`); pi/30 for rpm/(N m).
+        A negative one turns the sign.
     name : str, optional
         What reports call it; None: the file's name.
     delimiter, decimal, skip, encoding : optional
@@ -90,13 +92,19 @@ def read_response(
     file = checked_path(path, "path", ReadError)
     if not file.is_file():
         raise ReadError(f"{path}: there is no such file; give the path of a text table")
-    scale = above_zero(scale, "scale", ReadError, "give a number above 0, what 1 of the file is in SI units")
+    scale = real_number(scale, "scale", ReadError, "give a number, what 1 of the file is in SI units")
+    if scale == 0.0:
+        raise ReadError("scale is 0: give what 1 of the file is in SI units; a negative number turns the sign")
     table = open_text(str(path), file, TextOptions(delimiter, decimal, skip, encoding))
     if table.batches is not None:
         raise ReadError(f"{path}: too long for a frequency response; give a table of frequencies, or read a log with read()")
     found = _columns(table, dict(columns or {}))
     asked = known_keys(units or {}, "units", list(UNITS), (), ReadError)
-    values = {key: table.numbers(column, key) for key, column in found.items()}
+    at_zero = found["frequency"].whole() == 0.0
+    values = {key: table.numbers(_without(column, at_zero), key) for key, column in found.items()}
+    for key in ("magnitude", "real", "imaginary", "std"):
+        if key in found and not (key == "magnitude" and key in asked):
+            _refuse_other_size(table, key, found[key])
     factor = {key: _factor(table, key, found[key], asked.get(key)) for key in found if key in UNITS}
     frequency = values["frequency"] * factor["frequency"]
     if "real" in found:
@@ -110,13 +118,11 @@ def read_response(
     if "coherence" in found:
         more["coherence"] = values["coherence"] * factor["coherence"]
     if "std" in found:
-        more["std"] = values["std"] * scale
+        more["std"] = values["std"] * abs(scale)
     order = np.argsort(frequency, kind="stable")
     notes = []
-    at_zero = int(np.count_nonzero(frequency == 0.0))
-    if at_zero:
+    if at_zero.any():
         notes.append(f"{table.path}: the row at 0 Hz is left out.")
-        order = order[frequency[order] != 0.0]
     if dt is not None and isinstance(dt, int | float) and dt > 0.0:
         below = frequency[order] < 0.5 / dt  # no decision: a formula: half the sampling frequency
         if not below.all():
@@ -124,7 +130,10 @@ def read_response(
             order = order[below]
     arrays: dict[str, Any] = {key: array[order] for key, array in more.items()}
     called = file.name if name is None else name
-    return FrequencyResponse(frequency[order], scale * response[order], kind=kind, dt=dt, name=called, notes=notes, **arrays)
+    try:
+        return FrequencyResponse(frequency[order], scale * response[order], kind=kind, dt=dt, name=called, notes=notes, **arrays)
+    except RecordError as error:
+        raise ReadError(f"{table.path}: {error}") from None
 
 
 def _columns(table: LogTable, given: Mapping[str, str | int]) -> dict[str, Column]:
@@ -152,6 +161,26 @@ def _columns(table: LogTable, given: Mapping[str, str | int]) -> dict[str, Colum
     for key in ("magnitude", "phase") if parts[0] == "real" else ():
         found.pop(key, None)
     return found
+
+
+def _without(column: Column, rows: NDArray[np.bool_]) -> Column:
+    """A column without some rows; a cell of theirs that is no number is none of it."""
+    bad = None if column.bad is None or rows[column.bad[0]] else column.bad
+    return replace(column, values=column.whole()[~rows], bad=bad)
+
+
+def _refuse_other_size(table: LogTable, quantity: str, column: Column) -> None:
+    """Raises ReadError where a value has a unit that is not SI: `scale` says what 1 of it is."""
+    unit = _parted(column)[1]
+    plain = "" if unit is None else re.sub(r"[\s()*·]", "", unit).casefold()
+    if plain in SI or (quantity == "magnitude" and plain == "db"):
+        return
+    first = f"give {_given('units', quantity)} as '1'" if quantity == "magnitude" else "leave the unit out of its name"
+    given = arg("response_scale", "...", python="scale=...")
+    raise ReadError(
+        f"{table.path}: the {quantity} in column {column.key!r} is in {unit!r}: {first}, and say in {given} what 1 of it is in "
+        "rad/s/(N m), pi/30 for rpm/(N m)"
+    )
 
 
 def _given(argument: str, key: str) -> str:

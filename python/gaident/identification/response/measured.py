@@ -118,11 +118,20 @@ def frequency_response(rec: Record, controller: Controller | None = None) -> Fre
             )
         )
     drive = source if source is not None else rec.command if rec.command is not None and not _constant(rec.command) else torque
+    every = 1 if controller is None else controller.log_every(rec.dt)
+    if every > 1 and float(np.mean(np.diff(drive) == 0.0)) > 0.5:  # no decision: a formula: more lines than not
+        raise RecordError(
+            say(
+                "the log is slower than its controller, and its command jumps: what the {torque} does between the lines is not "
+                "what its spectrum shows; identify the record itself, or use a command that goes smoothly, as a multisine does"
+            )
+        )
+    if _constant(rec.velocity):
+        raise RecordError("the velocity never changes, so that it shows no response; use a record in which the axis moves")
     if _constant(torque):
         raise RecordError(say("the {torque} never changes, so that it excites no frequency; use a record whose {torque} changes"))
     period = _period(drive)
     lines = _periodic(torque, rec.velocity, drive, period, rec.dt) if period else _local(torque, rec.velocity, drive, rec.dt)
-    every = 1 if controller is None else controller.log_every(rec.dt)
     notes = [lines.how]
     value, std, keep = lines.value, lines.std, np.isfinite(lines.std) & (lines.std > 0.0) & (np.abs(lines.value) > 0.0)
     dt: float | None = rec.dt
@@ -180,7 +189,8 @@ def _periodic(u: Vector, w: Vector, r: Vector, period: int, dt: float) -> _Lines
     mean_u, mean_w = U.mean(axis=0), W.mean(axis=0)
     value = mean_w / mean_u
     left = np.sum(np.abs(W - value * U) ** 2, axis=0) / (count - 2)
-    window = np.ones(2 * NEAR + 1)
+    near = (len(line) - 1) // 2
+    window = np.ones(2 * (NEAR if near > NEAR else near) + 1)
     shared = np.convolve(left, window, "same") / np.convolve(np.ones(len(line)), window, "same")
     std = np.sqrt(shared / (count - 1)) / np.abs(mean_u)
     coherence = 1.0 / (1.0 + shared / (count - 1) / np.maximum(np.abs(mean_w) ** 2, 1e-300))

@@ -31,6 +31,12 @@ __all__ = ["ResponseSearch", "distinct_responses", "response_space", "told_of"]
 
 
 DIGITS = 1e-7  # no decision: rounding: of a value that is written with seven digits
+MOST_LINES = 600  # no decision: memory and time: frequencies of a response, where a delay is looked for
+GIVES_POWER = (
+    "The model gives power at some frequencies, which no chain of masses does that is driven and measured at the motor: take no "
+    "mechanics from it. The lag of a current loop, or a sensor at the load, would do that."
+)
+GIVEN = 0.1  # no decision: rounding: of |G|, by which errors of a response make a real part negative
 
 
 def distinct_responses(responses: Sequence[FrequencyResponse]) -> list[FrequencyResponse]:
@@ -71,6 +77,15 @@ def told_of(responses: Sequence[FrequencyResponse]) -> dict[str, Any]:
     }
 
 
+def _thinned(r: FrequencyResponse) -> FrequencyResponse:
+    """Every so many frequencies of a long response."""
+    every = 1 + len(r) // MOST_LINES
+    if every == 1:
+        return r
+    std, coherence = (None if a is None else a[::every] for a in (r.std, r.coherence))
+    return FrequencyResponse(r.frequency_hz[::every], r.response[::every], std, coherence, r.kind, dt=r.dt)
+
+
 class ResponseSearch(StructureSearch):
     """The search for the model behind frequency responses."""
 
@@ -100,11 +115,13 @@ class ResponseSearch(StructureSearch):
     def select(self, found: list[_core.Trial]) -> tuple[Assessed, list[Candidate]]:
         """See `StructureSearch`; where no chain of masses holds, one behind a delay is looked for."""
         best, scores = super().select(found)
-        holds = selection.is_chain(best.candidate) and not best.adequacy.falsified
-        if holds or self.delay is not None or not scores:
+        if self.delay is not None or not scores:
             return best, scores
         # A chain behind a delay is smaller than what makes up for one: it wins within the margin, as the smallest does.
-        delay = self._best_delay(min(c.bic for c in scores) + POLICY.rival_margin)
+        enough = min(c.bic for c in scores) + POLICY.rival_margin
+        if best.candidate.bic <= enough and self.holds(best.candidate):
+            return best, scores
+        delay = self._best_delay(enough)
         if delay is None:
             self._refuse_other_signs()
             return best, scores
@@ -112,11 +129,26 @@ class ResponseSearch(StructureSearch):
         found[:] = super().search(*self.runs, None)
         return super().select(found)
 
+    def holds(self, c: Candidate) -> bool:
+        """Whether a candidate is a chain of masses that the data do not contradict.
+
+        A chain that is driven and measured at the motor takes power at every frequency: Re G(j omega) >= 0.
+        """
+        return selection.is_chain(c) and not self.gives_power(c) and not self.assessed(c).adequacy.falsified
+
+    def gives_power(self, c: Candidate) -> bool:
+        """Whether a model has a real part below 0 in the band, more than errors make one."""
+        g = c.model.mechanism.frequency_response(np.concatenate([r.omega for r in self.responses]))
+        return bool(np.any(g.real < -GIVEN * np.abs(g)))
+
     def _refuse_other_signs(self) -> None:
         """Raises SpaceError where a chain of masses holds once the response's sign, or that of its phase, is another one."""
         held: list[tuple[float, str]] = []
         for turned, what in (
-            (np.negative, "has the opposite sign: the velocity falls where the torque rises; give -response"),
+            (
+                np.negative,
+                "has the opposite sign: the velocity falls where the torque rises; give -response (scale=-1 of read_response)",
+            ),
             (np.conj, "counts its phase the other way: a lag is positive in it; give the conjugate, numpy.conj(response)"),
         ):
             made = [
@@ -124,7 +156,7 @@ class ResponseSearch(StructureSearch):
             ]
             work = ResponseSearch(made, self.space, self.settings, self.workers)
             best = super(ResponseSearch, work).select(work.search(*self.runs, None))[0]
-            if selection.is_chain(best.candidate) and not best.adequacy.falsified:
+            if work.holds(best.candidate):
                 held.append((best.candidate.cost, what))
         if held:
             raise SpaceError(f"the response {min(held)[1]}")
@@ -133,8 +165,9 @@ class ResponseSearch(StructureSearch):
         """The delay [s] of the first chain of masses that holds behind one, else of the least BIC; None: none below that."""
         made: list[tuple[float, float]] = []
         highest = max(float(r.omega[-1]) for r in self.responses)
+        few = [_thinned(r) for r in self.responses]
+        work, whole = (ResponseSearch(of, self.space, self.settings, self.workers) for of in (few, self.responses))
         for begin in starts(self.parts):
-            work = ResponseSearch(self.responses, self.space, self.settings, self.workers)
             work._behind(begin)
             scores = super(ResponseSearch, work).select(work.search(*self.runs, None))[1]
             # Chains of masses, the smallest first: a larger structure takes a part of the delay for itself.
@@ -148,11 +181,19 @@ class ResponseSearch(StructureSearch):
                         break
                 if not (work.delay or 0.0) > 0.0:
                     continue
-                made.append((bic(c.cost / self.count, self.count, c.size + 1), work.delay or 0.0))
-                if made[-1][0] < less_than and not work.assessed(c).adequacy.falsified:
+                whole._behind(work.delay)
+                c = whole.refined(c)
+                cost = bic(c.cost / whole.count, whole.count, c.size + 1)
+                made.append((cost, work.delay or 0.0))
+                if cost < less_than and whole.holds(c):
                     return work.delay
         least = min(made, default=(math.inf, 0.0))
         return least[1] if least[0] < less_than else None
+
+    @property
+    def rounding(self) -> float:
+        """The error sum that a value's last digits make: what is less is rounding, which no structure explains."""
+        return DIGITS**2 * sum(float(np.sum(np.abs(p.weight * p.value) ** 2)) for p in self.parts)
 
     def noise_of(self, c: Candidate, in_part: bool = False) -> Autoregression:
         """White: the errors are weighed."""
@@ -160,9 +201,7 @@ class ResponseSearch(StructureSearch):
 
     def scored(self, candidates: Sequence[Candidate], noise: Autoregression, in_part: bool = False) -> list[Candidate]:
         """See `StructureSearch`."""
-        # What is less than a value's last digits is rounding, which no structure explains.
-        least = DIGITS**2 * sum(float(np.sum(np.abs(p.weight * p.value) ** 2)) for p in self.parts)
-        costs = [c.cost if c.cost > least else least for c in candidates]
+        costs = [c.cost if c.cost > self.rounding else self.rounding for c in candidates]
         return [
             selection.charged(c, bic(cost / self.count, self.count, c.size)) for c, cost in zip(candidates, costs, strict=True)
         ]
@@ -173,6 +212,7 @@ class ResponseSearch(StructureSearch):
         if self.delay is not None:
             plain = freed(self.experiment, self.parts, c, plain)
         verdict = assessed_responses(self.parts, c.model, c.size + (self.delay is not None))
+        verdict = replace(verdict, falsified=verdict.falsified and c.cost > self.rounding)
         known = all(p.known for p in self.parts)
         std = max(1.0, verdict.noise_std) if known else verdict.noise_std
         return Assessed(c, c.cost, std, plain, plain, verdict)
@@ -199,7 +239,7 @@ class ResponseSearch(StructureSearch):
         std = best.noise_std * delay_step(self.experiment, self.parts, best.candidate)[1]
         return Estimate(self.delay, std, "s", False, bool(std < self.delay))
 
-    def notes(self) -> Sequence[str]:
+    def notes(self, best: Assessed) -> Sequence[str]:
         """See `StructureSearch`."""
         found: list[str] = [note for r in self.responses for note in r.notes]
         if any(r.std is None for r in self.responses):
@@ -214,6 +254,8 @@ class ResponseSearch(StructureSearch):
                     "the controller's computing, its bus and about the lag of its current loop."
                 )
             )
+        if selection.is_chain(best.candidate) and self.gives_power(best.candidate):
+            found.append(GIVES_POWER)
         return list(dict.fromkeys(found)) + compared_notes(self.responses)
 
 
@@ -244,8 +286,10 @@ def compared_notes(responses: Sequence[FrequencyResponse]) -> list[Text]:
         stated = float(np.median(off[:part])) if r.std is not None else float(np.std(np.log(size[:part])))
         errors.append(math.sqrt(0.5 * math.pi / part) * stated)
         at = int(np.argmax(size))
-        peaks.append(float(omega[at]) / math.tau)
-        spacing.append(float(np.ptp(omega[max(0, at - 1) : at + 2])) / math.tau)
+        # A resonance stands out of |G| omega, which is flat for a rigid axis, and inside the band.
+        if 0 < at < len(size) - 1 and size[at] > 2.0 * float(np.median(size)):  # no decision: which peak the sentence speaks of
+            peaks.append(float(omega[at]) / math.tau)
+            spacing.append(float(np.ptp(omega[at - 1 : at + 2])) / math.tau)
     change, off_by = gains[1] / gains[0] - 1.0, POLICY.contradiction * math.hypot(*errors)
     between = f"Not linear: with {{torque}} of {large.amplitude:.3g} instead of {small.amplitude:.3g} N m"
     last = "Record a motion and diagnose it to know the cause."
@@ -254,7 +298,7 @@ def compared_notes(responses: Sequence[FrequencyResponse]) -> list[Text]:
         way, why = ("larger", "dry friction or a dead band") if change > 0.0 else ("smaller", "a limit of the {torque}")
         gain = f"the gain at low frequencies is {PERCENT * abs(change):.2g} % {way}"
         found.append(say(f"{between} {gain}; {why} would do that. {last}"))
-    if abs(peaks[1] - peaks[0]) > max(spacing):
+    if len(peaks) == len(curves) and abs(peaks[1] - peaks[0]) > max(spacing):
         why = "a gap or a hardening coupling" if peaks[1] > peaks[0] else "friction in the coupling or a softening one"
         moved = f"the peak moves from {peaks[0]:.4g} to {peaks[1]:.4g} Hz"
         found.append(say(f"{between} {moved}; {why} would do that. {last}"))
