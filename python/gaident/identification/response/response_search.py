@@ -32,6 +32,7 @@ __all__ = ["ResponseSearch", "distinct_responses", "response_space", "told_of"]
 
 DIGITS = 1e-7  # no decision: rounding: of a value that is written with seven digits
 MOST_LINES = 600  # no decision: memory and time: frequencies of a response, where a delay is looked for
+STANDS_OUT = 2.0  # no decision: which peak a sentence speaks of: one of twice the median
 GIVES_POWER = (
     "The model gives power at some frequencies, which no chain of masses does that is driven and measured at the motor: take no "
     "mechanics from it. The lag of a current loop, or a sensor at the load, would do that."
@@ -287,7 +288,7 @@ def compared_notes(responses: Sequence[FrequencyResponse]) -> list[Text]:
         errors.append(math.sqrt(0.5 * math.pi / part) * stated)
         at = int(np.argmax(size))
         # A resonance stands out of |G| omega, which is flat for a rigid axis, and inside the band.
-        if 0 < at < len(size) - 1 and size[at] > 2.0 * float(np.median(size)):  # no decision: which peak the sentence speaks of
+        if 0 < at < len(size) - 1 and size[at] > STANDS_OUT * float(np.median(size)):
             peaks.append(float(omega[at]) / math.tau)
             spacing.append(float(np.ptp(omega[at - 1 : at + 2])) / math.tau)
     change, off_by = gains[1] / gains[0] - 1.0, POLICY.contradiction * math.hypot(*errors)
