@@ -114,15 +114,16 @@ def report_page(
 ) -> str:
     """The text of what `report` writes."""
     check_installed(NEEDED, "pictures", "a report")
-    from plotly.offline import get_plotlyjs
-
-    plotly_js = get_plotlyjs() if live else ""
     if about is not None and not isinstance(about, Mapping):
         raise GaidentError(f"about is {about!r:.80}: give a dictionary of texts, for example {{'machine': 'press 4'}}")
     yes_or_no(live, "live", GaidentError)
     for key, value in (about or {}).items():
         if not isinstance(value, str):
             raise GaidentError(f"about: {key} is {value!r}: give text")
+
+    from plotly.offline import get_plotlyjs
+
+    plotly_js = get_plotlyjs() if live else ""
 
     def whole(view: View) -> View:
         return replace(view, scales=scales_of(units, view.axis), about=dict(about or {}))

@@ -115,8 +115,6 @@ def test_a_sample_time_is_told_by_the_torque_and_by_the_age_of_the_velocity(ever
     shown = period_shown([at_limit(every)], ga.PI(0.15, 8.0))
     if every == 1:
         assert shown is None
-    elif every == 8:  # 8 and 16 differ by 0.03 lines in the lag, which is known to 0.06: about 16 is proposed, none is taken
-        assert shown is not None and shown.controller == ga.PI(0.15, 8.0) and "about 16 times for each line" in shown.note
     else:
         assert shown is not None and shown.controller == ga.Cascade(ga.PI(0.15, 8.0), 1e-3 / every)
 

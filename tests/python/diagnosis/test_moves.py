@@ -18,6 +18,7 @@ from scipy.stats import chi2
 
 import gaident as ga
 from gaident.control.controller import Limiting
+from gaident.diagnosis.library.cause import Cause
 from gaident.diagnosis.selection import mechanisms, model_space, moves, score_test, select, side_moves
 from gaident.diagnosis.selection.bases import Task
 from gaident.diagnosis.selection.bootstrap import largest_gains
@@ -56,10 +57,10 @@ def pulse(at: float) -> Vector:
     return np.asarray(np.exp(-(((S - at) / 0.03) ** 2)))
 
 
-def toy(name: str, starts: Sequence[tuple[float, ...]], **more: object) -> Term:
+def toy(name: str, starts: Sequence[tuple[float, ...]], **more: object) -> Cause:
     """A term whose coordinates are its parameters, between -10 and 10."""
     size = max((len(row) for row in starts), default=1)
-    term = Term(
+    term = Cause(
         name,
         str(more.pop("place", "shaft")),
         natural=lambda z: z.copy(),
