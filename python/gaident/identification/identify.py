@@ -286,7 +286,7 @@ class RecordSearch(StructureSearch):
         verdict = adequacy.assess(sums)
         if self.weighed:
             beside = assessed_responses(self.weighed, c.model, c.size)
-            verdict = replace(beside, falsified=True) if beside.falsified and not verdict.falsified else verdict
+            verdict = beside if beside.falsified and not verdict.falsified else verdict
         return Assessed(c, float(products[0]), noise.std, plain, coloured, verdict)
 
     @cached_property

@@ -3,8 +3,8 @@
     G(f) = exp(-j omega tau) G_axis(f)
 
 Looked for where no chain of masses holds without one.
-From each delay of a grid the structures are searched anew, and the winner's delay goes on by Gauss-Newton steps together with the
-parameters x, of which those are then fitted again:
+From each delay of a grid the structures are searched anew, and from each chain of masses the delay goes on by Gauss-Newton steps
+together with the parameters x, which are then fitted again:
 
     e(tau + d, x + dx) = e + e_tau d - J dx,   e_tau = j omega e^(j omega tau) w G
 """
@@ -17,6 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from gaident import _core
 from gaident.identification.response.weighed import Weighed
 from gaident.identification.selection import Candidate
 
@@ -44,15 +45,13 @@ def starts(parts: list[Weighed]) -> list[float]:
     return [phase / highest for phase in GRID]
 
 
-def _linear(experiment: object, parts: list[Weighed], c: Candidate) -> _Linear:
-    error, columns, _ = experiment.sensitivities(  # type: ignore[attr-defined]
-        c.fit.gain, c.fit.poles, c.fit.zeros, [], []
-    )
+def _linear(experiment: _core.Experiment, parts: list[Weighed], c: Candidate) -> _Linear:
+    error, columns, _ = experiment.sensitivities(c.fit.gain, c.fit.poles, c.fit.zeros, [], [])
     turned = np.concatenate([1j * p.response.omega * p.weight * p.value for p in parts])
     return _Linear(error, columns, np.stack([turned.real, turned.imag], axis=1).ravel())
 
 
-def delay_step(experiment: object, parts: list[Weighed], c: Candidate) -> tuple[float, float]:
+def delay_step(experiment: _core.Experiment, parts: list[Weighed], c: Candidate) -> tuple[float, float]:
     """(what a Gauss-Newton step adds to the delay [s], its standard deviation for errors of unit variance)."""
     linear = _linear(experiment, parts, c)
     # What the model's parameters can do is taken out of both.
@@ -63,7 +62,7 @@ def delay_step(experiment: object, parts: list[Weighed], c: Candidate) -> tuple[
     return (-float(of_delay @ error) / size, 1.0 / math.sqrt(size)) if size > 0.0 else (0.0, math.inf)
 
 
-def freed(experiment: object, parts: list[Weighed], c: Candidate, plain: Vector) -> Vector:
+def freed(experiment: _core.Experiment, parts: list[Weighed], c: Candidate, plain: Vector) -> Vector:
     """J'J of the model's parameters where the delay is unknown, too: its Schur complement."""
     linear = _linear(experiment, parts, c)
     cross = linear.of_model @ linear.of_delay

@@ -105,8 +105,7 @@ class ResponseSearch(StructureSearch):
         """Take out a delay of the path [s]; None: there is none."""
         self.delay = delay
         self.parts = [replace(w, delay=delay or 0.0) for w in weighed(self.responses, continuous=False, scale=1.0)]
-        self.measured = [p.core() for p in self.parts]
-        self.experiment = self.searched = core.experiment([], None, 1.0, responses=self.measured)
+        self.experiment = self.searched = core.experiment([], None, 1.0, responses=[p.core() for p in self.parts])
 
     def search(self, trials: int, seed: int, progress: ProgressCallback | None) -> list[_core.Trial]:
         """See `StructureSearch`."""
