@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from gaident.errors import ModelError
 from gaident.models.roots import quadratic_roots
 
-__all__ = ["LATE", "LINEAR", "Transfer", "response_of"]
+__all__ = ["LAG", "LATE", "LINEAR", "Transfer", "response_of"]
 
 
 class Transfer(NamedTuple):
@@ -61,6 +61,8 @@ LINEAR: dict[str, Callable[[Sequence[float]], Transfer]] = {
     "velocity_observer": _tracking,
 }
 """Effect -> its transfer function, from its parameters in the order of the table."""
+
+LAG = "torque_lag"  # of first order, of the torque: its parameter is time_constant
 
 LATE: dict[str, Callable[[Sequence[float], float], float]] = {
     "velocity_difference": lambda values, period: 0.5 * values[0] * period,

@@ -22,7 +22,7 @@ from gaident.models.effects_linear import LATE
 from gaident.models.model import Model
 from gaident.policy.table import POLICY
 from gaident.remedies.doubts import doubts_of, no_gains
-from gaident.remedies.draws import age_of, drawn_models, path_delay_of
+from gaident.remedies.draws import age_of, behind_lag, drawn_models, path_delay_of
 from gaident.remedies.figures import Judge
 from gaident.remedies.loops import Loops, frequencies_of
 from gaident.remedies.nonlinear import simulated_with, without_each
@@ -130,7 +130,7 @@ def retune(
         raise SettingsError(f"seed is {seed!r}: give a whole number >= 0")
     age = age_of(result, given)
     axis = result.axis if isinstance(result, Diagnosis) else "rotary"
-    drawn = drawn_models(result, POLICY.checked_drives, seed)
+    drawn = [behind_lag(model, result) for model in drawn_models(result, POLICY.checked_drives, seed)]
     linear = [_with_what_is_late(model) for model in drawn]
     if linear[0].gain < 0.0 or linear[0].p < 1:
         raise SettingsError(
@@ -158,7 +158,7 @@ def retune(
         found = replace(given, kp=proposal.velocity.kp, ki=proposal.velocity.ki)
     after = judge.figures(proposal)
     now, then = older(given, age), older(found, age)
-    told = simulated_with(result.model, now, then, period, asked.step, after)
+    told = simulated_with(drawn[0], now, then, period, asked.step, after)
     return Retuning(
         controller=found,
         given=given,
@@ -175,9 +175,9 @@ def retune(
         rule=tuned.rule,
         starts=work.starts(),
         simulated=told,
-        mended=without_each(result.model, then, period, asked.step, after),
+        mended=without_each(drawn[0], then, period, asked.step, after),
         notes=(*notes, *more, *_of_the_covariance(len(drawn) - 1, holds), *_of_the_mechanism(result.model)),
-        model=result.model,
+        model=drawn[0],
         period=period,
         velocity_age=age,
         path_delay=path_delay,

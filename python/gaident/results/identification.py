@@ -93,8 +93,8 @@ class Identification(SavedResult):
         The data; empty where the identification was loaded from a file.
     frequencies : int
         Frequencies of all responses. Of responses alone `samples` is 0 and `rmse` that of the relative error [1].
-    delay : Estimate or None
-        A delay of the path [s] that the frequency responses contain beside the axis; None: none was needed.
+    delay, lag : Estimate or None
+        Of the torque's path [s], which the frequency responses contain beside the axis; None: none was needed.
     response_digests : tuple of str
         Digests of the frequency responses, see `FrequencyResponse.digest`.
     responses : tuple of FrequencyResponse
@@ -132,6 +132,7 @@ class Identification(SavedResult):
     records: tuple[Record, ...] = field(default=(), compare=False, repr=False)
     frequencies: int = 0
     delay: Estimate | None = None
+    lag: Estimate | None = None
     response_digests: tuple[str, ...] = ()
     responses: tuple[FrequencyResponse, ...] = field(default=(), compare=False, repr=False)
 
@@ -289,8 +290,8 @@ class Identification(SavedResult):
             Where the record shows no frequency response.
         """
         if records is None and self.responses:
-            late = 0.0 if self.delay is None else self.delay.value
-            return picture("plot_frequency_response", self.responses, self.model, hz, axis, late)
+            late = (0.0 if e is None else e.value for e in (self.delay, self.lag))
+            return picture("plot_frequency_response", self.responses, self.model, hz, axis, *late)
         return picture("plot_bode", self.model, self.controller, self._chosen(records), hz, axis)
 
     def plot_poles(self, hz: bool = False) -> Figure:
@@ -345,7 +346,7 @@ class Identification(SavedResult):
             "samples": self.samples,
             "digests": list(self.digests),
             "frequencies": self.frequencies,
-            "delay": None if self.delay is None else asdict(self.delay),
+            **{name: None if e is None else asdict(e) for name, e in (("delay", self.delay), ("lag", self.lag))},
             "response_digests": list(self.response_digests),
             "initial_states": {d: list(s) for d, s in self.initial_states.items()},
             "controller_numbers": {name: asdict(e) for name, e in self.controller_numbers.items()},
@@ -388,5 +389,6 @@ class Identification(SavedResult):
                 covariance=rows_of(data.get("covariance")),
                 frequencies=data.get("frequencies", 0),
                 delay=Estimate(**data["delay"]) if data.get("delay") else None,
+                lag=Estimate(**data["lag"]) if data.get("lag") else None,
                 response_digests=tuple(data.get("response_digests", ())),
             )

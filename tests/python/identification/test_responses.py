@@ -104,6 +104,43 @@ def test_a_delay_in_the_path_is_found_and_taken_out() -> None:
     assert again == idn and again.delay == idn.delay
 
 
+@pytest.mark.parametrize(("late", "lag"), [(0.3e-3, 0.2e-3), (0.0, 0.4e-3), (0.05e-3, 0.6e-3)])
+def test_delay_and_lag_of_the_path_are_told_apart(late: float, lag: float) -> None:
+    """A delay turns the phase alone, a lag makes the magnitude smaller, too."""
+    g = noisy(exact() * np.exp(-2j * np.pi * F * late) / (1.0 + 2j * np.pi * F * lag), 0.01, 22)
+    idn = ga.identify(ga.FrequencyResponse(F, g, 0.01 * np.abs(g)))
+    within(idn)
+    assert idn.lag is not None and abs(idn.lag.value - lag) < 4.0 * idn.lag.std < 2e-5
+    assert (idn.delay is None) == (late == 0.0)
+    if idn.delay is not None:
+        assert abs(idn.delay.value - late) < 4.0 * idn.delay.std < 2e-5
+    assert any(f"a lag of {1e3 * idn.lag.value:.4g} ms (the current loop" in w for w in idn.warnings)
+    again = ga.Identification.from_dict(idn.to_dict())
+    assert again == idn and again.lag == idn.lag
+
+
+def test_gains_are_designed_with_the_path_in_the_loop() -> None:
+    """Behind a lag the loop is slower, and the model of the gains has it."""
+    lag, loop = 2e-3, ga.PI(kp=0.02, ki=0.4)
+    g = noisy(exact(), 0.01, 23)
+    without = ga.retune(ga.identify(ga.FrequencyResponse(F, g, 0.01 * np.abs(g))), loop, dt=1e-3)
+    g = g / (1.0 + 2j * np.pi * F * lag)
+    behind = ga.retune(ga.identify(ga.FrequencyResponse(F, g, 0.01 * np.abs(g))), loop, dt=1e-3)
+    assert behind.after.bandwidth.value < 0.8 * without.after.bandwidth.value
+    (effect,) = behind.model.effects
+    assert effect.name == "torque_lag" and effect.parameters["time_constant"] == pytest.approx(lag, rel=0.01)
+
+
+def test_the_picture_has_the_model_behind_its_path() -> None:
+    """The curve that is drawn lies on what was measured."""
+    g = exact() * np.exp(-2j * np.pi * F * 0.3e-3) / (1.0 + 2j * np.pi * F * 0.4e-3)
+    idn = ga.identify(ga.FrequencyResponse(F, noisy(g, 0.001, 24)))
+    axes = idn.plot_bode(hz=True).axes
+    (curve,) = (line for line in axes[0].lines if len(line.get_xdata()) > 2 * len(F))
+    shown = np.interp(np.log(F), np.log(np.asarray(curve.get_xdata(), float)), np.asarray(curve.get_ydata(), float))
+    assert np.max(np.abs(shown / np.abs(g) - 1.0)) < 0.02
+
+
 def test_what_no_linear_model_has_is_falsified() -> None:
     """A gain that falls in steps, as of a drive that saturates at some frequencies."""
     g = noisy(exact(), 0.005, 10) * np.where(np.arange(60) // 7 % 2, 1.0, 0.85)
@@ -203,9 +240,10 @@ def test_few_frequencies_behind_a_delay_are_no_chain_that_gives_power() -> None:
 
 
 def test_a_chain_that_gives_power_says_so() -> None:
-    """Behind a delay and the lag of a current loop the nearest chain turns the lag into masses."""
+    """Behind a delay and a current loop of second order the nearest chain turns what is left into masses."""
     f = np.geomspace(4.0, 700.0, 200)
-    late = np.exp(-2j * np.pi * f * 0.3e-3) / (1.0 + 2j * np.pi * f * 0.2e-3)
+    s = 2j * np.pi * f
+    late = np.exp(-s * 0.3e-3) / (1.0 + s * 0.3e-3 + (s * 0.2e-3) ** 2)
     idn = ga.identify(ga.FrequencyResponse(f, noisy(exact(f) * late, 0.0015, 31)))
     assert (idn.p, idn.q) == (1, 4) and any("gives power" in w for w in idn.warnings)
     plain = ga.identify(ga.FrequencyResponse(f, noisy(exact(f), 0.0015, 31)))

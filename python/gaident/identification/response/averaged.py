@@ -28,6 +28,7 @@ from gaident.control.pi_torque import pi_torque
 from gaident.data.frequency.response import FrequencyResponse
 from gaident.data.record import Record
 from gaident.errors import RecordError
+from gaident.identification.response.path import NO_PATH, Path
 from gaident.models.held_torque import held_mean
 from gaident.models.model import Model
 from gaident.models.simulate import Run, run
@@ -65,8 +66,8 @@ def response_of(rec: Record, model: Model, controller: PI | None = None) -> Resp
     )
 
 
-def responses_of(given: Sequence[FrequencyResponse], model: Model | None, delay: float = 0.0) -> Responses:
-    """The same of responses that were given, all in one, and of a model behind a delay [s]; None: without a model."""
+def responses_of(given: Sequence[FrequencyResponse], model: Model | None, path: Path = NO_PATH) -> Responses:
+    """The same of responses that were given, all in one, and of a model behind a path; None: without a model."""
     frequency = np.concatenate([r.frequency_hz for r in given])
     order = np.argsort(frequency, kind="stable")
     value = np.concatenate([r.velocity_response for r in given])
@@ -84,7 +85,7 @@ def responses_of(given: Sequence[FrequencyResponse], model: Model | None, delay:
     if dt is not None:
         fine = fine[fine < 0.5 / dt]  # no decision: a formula: half the sampling frequency
     own = model.mechanism.frequency_response(2.0 * np.pi * fine) if dt is None else sampled_response(model, fine, dt)
-    return Responses(measured, None, fine, own * np.exp(-2j * np.pi * fine * delay))
+    return Responses(measured, None, fine, own / path.inverse(2.0 * np.pi * fine))
 
 
 def _fine(model: Model, low: float, high: float) -> Vector:

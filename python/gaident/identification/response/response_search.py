@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from itertools import pairwise
 from typing import Any
@@ -18,7 +18,7 @@ from gaident.errors import RecordError, SettingsError, SpaceError
 from gaident.estimation.criterion import bic
 from gaident.identification import selection
 from gaident.identification.noise import Autoregression
-from gaident.identification.response.delay import SMALL, STEPS, delay_step, freed, starts
+from gaident.identification.response.path import LONGEST, NO_PATH, SMALL, STEPS, Path, Turned, freed, path_step, starts, with_lag
 from gaident.identification.response.weighed import assessed_responses, weighed
 from gaident.identification.selection import Candidate
 from gaident.identification.structure_search import PERCENT, Assessed, ProgressCallback, StructureSearch
@@ -31,11 +31,11 @@ __all__ = ["ResponseSearch", "distinct_responses", "response_space", "told_of"]
 
 
 DIGITS = 1e-7  # no decision: rounding: of a value that is written with seven digits
-MOST_LINES = 600  # no decision: memory and time: frequencies of a response, where a delay is looked for
+MOST_LINES = 600  # no decision: memory and time: frequencies of a response, where a path is looked for
 STANDS_OUT = 2.0  # no decision: which peak a sentence speaks of: one of twice the median
 GIVES_POWER = (
     "The model gives power at some frequencies, which no chain of masses does that is driven and measured at the motor: take no "
-    "mechanics from it. The lag of a current loop, or a sensor at the load, would do that."
+    "mechanics from it. A sensor at the load would do that."
 )
 GIVEN = 0.1  # no decision: rounding: of |G|, by which errors of a response make a real part negative
 
@@ -99,12 +99,12 @@ class ResponseSearch(StructureSearch):
         self.responses = list(responses)
         self.count = self.searched_count = 2 * sum(len(r) for r in self.responses)
         self.runs = 1, 0
-        self._behind(None)
+        self._behind(NO_PATH)
 
-    def _behind(self, delay: float | None) -> None:
-        """Take out a delay of the path [s]; None: there is none."""
-        self.delay = delay
-        self.parts = [replace(w, delay=delay or 0.0) for w in weighed(self.responses, continuous=False, scale=1.0)]
+    def _behind(self, path: Path) -> None:
+        """Take out a path of the torque."""
+        self.path = path
+        self.parts = [replace(w, path=path) for w in weighed(self.responses, continuous=False, scale=1.0)]
         self.experiment = self.searched = core.experiment([], None, 1.0, responses=[p.core() for p in self.parts])
 
     def search(self, trials: int, seed: int, progress: ProgressCallback | None) -> list[_core.Trial]:
@@ -113,19 +113,19 @@ class ResponseSearch(StructureSearch):
         return super().search(trials, seed, progress)
 
     def select(self, found: list[_core.Trial]) -> tuple[Assessed, list[Candidate]]:
-        """See `StructureSearch`; where no chain of masses holds, one behind a delay is looked for."""
+        """See `StructureSearch`; where no chain of masses holds, one behind a delay and a lag is looked for."""
         best, scores = super().select(found)
-        if self.delay is not None or not scores:
+        if self.path.unknowns or not scores:
             return best, scores
-        # A chain behind a delay is smaller than what makes up for one: it wins within the margin, as the smallest does.
+        # A chain behind a path is smaller than what makes up for one: it wins within the margin, as the smallest does.
         enough = min(c.bic for c in scores) + POLICY.rival_margin
         if best.candidate.bic <= enough and self.holds(best.candidate):
             return best, scores
-        delay = self._best_delay(enough)
-        if delay is None:
+        path = self._best_path(enough)
+        if path is None:
             self._refuse_other_signs()
             return best, scores
-        self._behind(delay)
+        self._behind(path)
         found[:] = super().search(*self.runs, None)
         return super().select(found)
 
@@ -161,34 +161,68 @@ class ResponseSearch(StructureSearch):
         if held:
             raise SpaceError(f"the response {min(held)[1]}")
 
-    def _best_delay(self, less_than: float) -> float | None:
-        """The delay [s] of the first chain of masses that holds behind one, else of the least BIC; None: none below that."""
-        made: list[tuple[float, float]] = []
-        highest = max(float(r.omega[-1]) for r in self.responses)
+    def _best_path(self, less_than: float) -> Path | None:
+        """The path of the first chain of masses that holds behind one, else of the least BIC; None: none below that."""
         few = [_thinned(r) for r in self.responses]
         work, whole = (ResponseSearch(of, self.space, self.settings, self.workers) for of in (few, self.responses))
-        for begin in starts(self.parts):
-            work._behind(begin)
-            scores = super(ResponseSearch, work).select(work.search(*self.runs, None))[1]
-            # Chains of masses, the smallest first: a larger structure takes a part of the delay for itself.
-            for c in sorted(filter(selection.is_chain, scores), key=lambda c: c.size):
-                work._behind(begin)
-                for _ in range(STEPS):
-                    step = delay_step(work.experiment, work.parts, c)[0]
-                    work._behind((work.delay or 0.0) + step)
-                    c = work.refined(c)
-                    if abs(step) * highest < SMALL:
-                        break
-                if not (work.delay or 0.0) > 0.0:
-                    continue
-                whole._behind(work.delay)
-                c = whole.refined(c)
-                cost = bic(c.cost / whole.count, whole.count, c.size + 1)
-                made.append((cost, work.delay or 0.0))
-                if cost < less_than and whole.holds(c):
-                    return work.delay
-        least = min(made, default=(math.inf, 0.0))
-        return least[1] if least[0] < less_than else None
+        begin = [Path(delay) for delay in starts(self._highest)]
+        least: dict[int, tuple[float, Path]] = {}  # of each chain of masses
+        while begin:
+            better: dict[int, Path] = {}
+            for path, c in work._chains_behind(begin.pop(0)):
+                whole._behind(path)
+                fit = whole.refined(c)
+                cost = bic(fit.cost / whole.count, whole.count, fit.size + len(path.unknowns))
+                if cost < less_than and whole.holds(fit):
+                    return path
+                if c.q not in least or cost < least[c.q][0] - POLICY.rival_margin:
+                    least[c.q], better[c.q] = (cost, path), path
+            # Behind a better path the structures are searched anew: from a wrong one the larger do not find their way.
+            begin[:0] = [better[q] for q in sorted(better)]
+        cost, path = min(least.values(), key=lambda found: found[0], default=(math.inf, NO_PATH))
+        return path if cost < less_than else None
+
+    def _chains_behind(self, begin: Path) -> Iterator[tuple[Path, Candidate]]:
+        """Chains of masses with their paths, from a path on."""
+        self._behind(begin)
+        scores = super().select(self.search(*self.runs, None))[1]
+        # The smallest first: a larger structure takes a part of the path for itself.
+        for c in sorted(filter(selection.is_chain, scores), key=lambda c: c.size):
+            # A delay alone, then a lag beside it: the simpler path that holds is taken.
+            late, fitted = self._with_path(begin, c)
+            if late.unknowns:
+                yield late, fitted
+            for start in with_lag(late) if late.lag is None else ():
+                path, fit = self._with_path(start, fitted)
+                if path.unknowns:
+                    yield path, fit
+
+    @property
+    def _highest(self) -> float:
+        return max(float(r.omega[-1]) for r in self.responses)
+
+    def _with_path(self, path: Path, c: Candidate) -> tuple[Path, Candidate]:
+        """Path and chain of masses fitted together, from a path on."""
+        self._behind(path)
+        c = self.refined(c)
+        for _ in range(STEPS):
+            if not self.path.unknowns:
+                break
+            step = path_step(self._turned(c))[0]
+            phase = float(np.max(np.abs(step))) * self._highest
+            self._behind(self.path.moved(step / max(1.0, phase / LONGEST)))
+            c = self.refined(c)
+            if phase < SMALL:
+                break
+        return self.path, c
+
+    def _turned(self, c: Candidate) -> Turned:
+        error, columns, _ = self.experiment.sensitivities(c.fit.gain, c.fit.poles, c.fit.zeros, [], [])
+        of_path = [
+            np.concatenate([p.weight * p.value * p.path.derivatives(p.response.omega)[i] for p in self.parts])
+            for i in range(len(self.path.unknowns))
+        ]
+        return Turned(error, columns, np.array([np.stack([z.real, z.imag], axis=1).ravel() for z in of_path]))
 
     @property
     def rounding(self) -> float:
@@ -209,9 +243,9 @@ class ResponseSearch(StructureSearch):
     def assessed(self, c: Candidate) -> Assessed:
         """See `StructureSearch`; deviations are those that are stated, or larger where what is left is."""
         plain = self.experiment.fit_sums(c.fit, [], [], 0.0)[0]
-        if self.delay is not None:
-            plain = freed(self.experiment, self.parts, c, plain)
-        verdict = assessed_responses(self.parts, c.model, c.size + (self.delay is not None))
+        if self.path.unknowns:
+            plain = freed(self._turned(c), plain)
+        verdict = assessed_responses(self.parts, c.model, c.size + len(self.path.unknowns))
         verdict = replace(verdict, falsified=verdict.falsified and c.cost > self.rounding)
         known = all(p.known for p in self.parts)
         std = max(1.0, verdict.noise_std) if known else verdict.noise_std
@@ -229,15 +263,18 @@ class ResponseSearch(StructureSearch):
             "samples": 0,
             "digests": (),
             "initial_states": {},
-            "delay": None if self.delay is None else self.found_delay(best),
+            **self.found_path(best),
             **told_of(self.responses),
         }
 
-    def found_delay(self, best: Assessed) -> Estimate:
-        """The delay with its deviation."""
-        assert self.delay is not None
-        std = best.noise_std * delay_step(self.experiment, self.parts, best.candidate)[1]
-        return Estimate(self.delay, std, "s", False, bool(std < self.delay))
+    def found_path(self, best: Assessed) -> dict[str, Estimate]:
+        """Delay and lag of the path with their deviations, where there are any."""
+        if not self.path.unknowns:
+            return {}
+        std = best.noise_std * np.sqrt(np.diag(path_step(self._turned(best.candidate))[1]))
+        values = [getattr(self.path, name) for name in self.path.unknowns]
+        made = [Estimate(value, float(off), "s", False, bool(off < value)) for value, off in zip(values, std, strict=True)]
+        return dict(zip(self.path.unknowns, made, strict=True))
 
     def notes(self, best: Assessed) -> Sequence[str]:
         """See `StructureSearch`."""
@@ -247,16 +284,23 @@ class ResponseSearch(StructureSearch):
                 "A response without standard deviations (std): how large its errors are is taken from what the model leaves, and "
                 "whether they are as large as they should be cannot be tested."
             )
-        if self.delay is not None:
-            found.append(
-                say(
-                    f"The response is that of the axis behind a delay of {1e3 * self.delay:.4g} ms, of which nothing was said: "
-                    "the controller's computing, its bus and about the lag of its current loop."
-                )
-            )
+        if self.path.unknowns:
+            found.append(_said(self.path))
         if selection.is_chain(best.candidate) and self.gives_power(best.candidate):
             found.append(GIVES_POWER)
         return list(dict.fromkeys(found)) + compared_notes(self.responses)
+
+
+def _said(path: Path) -> Text:
+    """That the axis lies behind a path."""
+    late = "the controller's computing, its bus"
+    late += ", about the lag of its current loop" if path.lag is None else ""
+    parts = {
+        "delay": f"a delay of {1e3 * (path.delay or 0.0):.4g} ms ({late})",
+        "lag": f"a lag of {1e3 * (path.lag or 0.0):.4g} ms (the current loop, or a filter of the {{torque}})",
+    }
+    there = " and ".join(parts[name] for name in path.unknowns)
+    return say(f"The response is that of the axis behind {there}, of which nothing was said.")
 
 
 def compared_notes(responses: Sequence[FrequencyResponse]) -> list[Text]:

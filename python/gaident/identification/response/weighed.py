@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from gaident import _core
 from gaident.data.frequency.response import FrequencyResponse
 from gaident.identification.noise import autocorrelation, chi2_tail, ljung_box_of
+from gaident.identification.response.path import NO_PATH, Path
 from gaident.models.model import Model
 from gaident.policy.table import POLICY
 from gaident.results.adequacy import Adequacy
@@ -35,14 +36,14 @@ NEIGHBOURS = 5  # no decision: a grid: frequencies apart at most; what a missing
 class Weighed:
     """A response with the deviation that counts, over its magnitude: `relative_std` times `size`, 1 where a deviation is stated.
 
-    continuous: whether the loop beside it is the paper's, in which the plant is bilinear. delay: of its path [s], taken out.
+    continuous: whether the loop beside it is the paper's, in which the plant is bilinear. path: of its torque, taken out.
     """
 
     response: FrequencyResponse
     size: float
     scale: float
     continuous: bool
-    delay: float = 0.0
+    path: Path = NO_PATH
 
     @property
     def known(self) -> bool:
@@ -51,8 +52,8 @@ class Weighed:
 
     @property
     def value(self) -> Complex:
-        """From torque to velocity, without the delay."""
-        made: Complex = self.response.velocity_response * np.exp(1j * self.response.omega * self.delay)
+        """From torque to velocity, without the path."""
+        made: Complex = self.response.velocity_response * self.path.inverse(self.response.omega)
         return made
 
     @property
