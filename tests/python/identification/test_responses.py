@@ -114,7 +114,7 @@ def test_delay_and_lag_of_the_path_are_told_apart(late: float, lag: float) -> No
     assert (idn.delay is None) == (late == 0.0)
     if idn.delay is not None:
         assert abs(idn.delay.value - late) < 4.0 * idn.delay.std < 2e-5
-    assert any(f"a lag of {1e3 * idn.lag.value:.4g} ms (the current loop" in w for w in idn.warnings)
+    assert any(f"a lag of {1e3 * idn.lag.value:.4g} +- {1e3 * idn.lag.std:.2g} ms (the current loop" in w for w in idn.warnings)
     again = ga.Identification.from_dict(idn.to_dict())
     assert again == idn and again.lag == idn.lag
 

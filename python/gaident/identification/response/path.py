@@ -5,8 +5,8 @@
 The delay is that of the controller's computing and of a bus, the lag that of a current loop.
 Looked for where no chain of masses holds without them.
 From each delay of a grid the structures are searched anew.
-From each chain of masses tau alone, then tau and T, go on by Gauss-Newton steps together with the parameters x, which are then
-fitted again:
+From each chain of masses tau alone, T alone, then tau and T go on by Gauss-Newton steps together with the parameters x, which are
+then fitted again:
 
     e(tau + d, T + l, x + dx) = e + e_tau d + e_T l - J dx,
     e_tau = j omega w G/H,   e_T = j omega/(1 + j omega T) w G/H
@@ -83,8 +83,8 @@ def starts(highest: float) -> list[float]:
 
 
 def with_lag(path: Path) -> list[Path]:
-    """Where the search for a delay and a lag begins once the best delay alone is known."""
-    return [Path((1.0 - part) * path.total, part * path.total) for part in LAGS]
+    """Where the search goes on once the best delay alone is known: from a lag alone, then from a delay and a lag."""
+    return [Path(lag=path.total), *(Path((1.0 - part) * path.total, part * path.total) for part in LAGS)]
 
 
 def path_step(turned: Turned) -> tuple[Vector, Vector]:
@@ -102,5 +102,6 @@ def path_step(turned: Turned) -> tuple[Vector, Vector]:
 def freed(turned: Turned, plain: Vector) -> Vector:
     """J'J of the model's parameters where the path is unknown, too: its Schur complement."""
     cross = turned.of_model @ turned.of_path.T
-    left: Vector = plain - cross @ np.linalg.solve(turned.of_path @ turned.of_path.T, cross.T)
+    # A lag that is nothing moves the response as a delay does: then they are one unknown.
+    left: Vector = plain - cross @ np.linalg.pinv(turned.of_path @ turned.of_path.T, hermitian=True) @ cross.T
     return left

@@ -188,7 +188,7 @@ class ResponseSearch(StructureSearch):
         scores = super().select(self.search(*self.runs, None))[1]
         # The smallest first: a larger structure takes a part of the path for itself.
         for c in sorted(filter(selection.is_chain, scores), key=lambda c: c.size):
-            # A delay alone, then a lag beside it: the simpler path that holds is taken.
+            # A delay alone, a lag alone, then both: the simpler path that holds is taken.
             late, fitted = self._with_path(begin, c)
             if late.unknowns:
                 yield late, fitted
@@ -285,22 +285,18 @@ class ResponseSearch(StructureSearch):
                 "whether they are as large as they should be cannot be tested."
             )
         if self.path.unknowns:
-            found.append(_said(self.path))
+            found.append(_said(self.found_path(best)))
         if selection.is_chain(best.candidate) and self.gives_power(best.candidate):
             found.append(GIVES_POWER)
         return list(dict.fromkeys(found)) + compared_notes(self.responses)
 
 
-def _said(path: Path) -> Text:
+def _said(path: dict[str, Estimate]) -> Text:
     """That the axis lies behind a path."""
-    late = "the controller's computing, its bus"
-    late += ", about the lag of its current loop" if path.lag is None else ""
-    parts = {
-        "delay": f"a delay of {1e3 * (path.delay or 0.0):.4g} ms ({late})",
-        "lag": f"a lag of {1e3 * (path.lag or 0.0):.4g} ms (the current loop, or a filter of the {{torque}})",
-    }
-    there = " and ".join(parts[name] for name in path.unknowns)
-    return say(f"The response is that of the axis behind {there}, of which nothing was said.")
+    late = "the controller's computing, its bus" + ("" if "lag" in path else ", about the lag of its current loop")
+    causes = {"delay": late, "lag": "the current loop, or a filter of the {torque}"}
+    there = [f"a {name} of {1e3 * e.value:.4g} +- {1e3 * e.std:.2g} ms ({causes[name]})" for name, e in path.items()]
+    return say(f"The response is that of the axis behind {' and '.join(there)}, of which nothing was said.")
 
 
 def compared_notes(responses: Sequence[FrequencyResponse]) -> list[Text]:
