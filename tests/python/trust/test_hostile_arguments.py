@@ -32,6 +32,7 @@ HOSTILE: list[Any] = [
     *(np.zeros(0), np.zeros((2, 2)), np.array(["a"]), np.float64(1e308), np.full(N, np.nan), np.full(N, 1e200)),
 ]
 
+BAND = np.geomspace(1.0, 100.0, 20)
 SIZE = ga.effects.Parameter("size", "1", neutral=0.0, lowest=0.0, highest=1.0)
 NAMED = {"time": "t", "command": "w_ref", "velocity": "w", "torque": "M"}
 
@@ -58,6 +59,9 @@ CALLS: dict[str, tuple[Callable[..., Any], dict[str, Any]]] = {
     "mechanics_from_model": (ga.mechanics_from_model, {"model": ONE}),
     "factor_parameters": (ga.factor_parameters, {"model": ONE}),
     "frequency_response": (ONE.frequency_response, {"omega": 1.0}),
+    "FrequencyResponse": (ga.FrequencyResponse, {"frequency_hz": BAND, "response": ONE.frequency_response(2.0 * np.pi * BAND)}),
+    "read_response": (ga.read_response, {"path": "bode.csv"}),
+    "frequency_response of a record": (ga.frequency_response, {"rec": REC, "controller": PI}),
     "discrete": (ONE.discrete, {"dt": 1e-3}),
     "to_c": (ONE.to_c, {"path": None, "dt": 1e-3, "controller": PI}),
     "to_scipy": (ONE.to_scipy, {}),
@@ -105,6 +109,10 @@ def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     monkeypatch.chdir(tmp_path)
     rows = np.column_stack([REC.time, COMMAND, REC.velocity, np.asarray(REC.torque)])
     np.savetxt("log.csv", rows, delimiter=",", header="t,w_ref,w,M", comments="")
+    g = ONE.frequency_response(2.0 * np.pi * BAND)
+    header = "frequency [Hz],real,imaginary"
+    np.savetxt("bode.csv", np.column_stack([BAND, g.real, g.imag]), delimiter=",", header=header, comments="")
+    assert len(ga.read_response("bode.csv")) == len(BAND)
     return tmp_path
 
 

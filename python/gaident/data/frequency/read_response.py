@@ -18,6 +18,7 @@ from gaident.data.formats.delimited import TextOptions, open_text
 from gaident.data.formats.table import Column, LogTable
 from gaident.data.frequency.columns import COLUMNS, SI, UNITS
 from gaident.data.frequency.response import FrequencyResponse
+from gaident.data.signals.arrays import sample_time
 from gaident.errors import ReadError, RecordError
 
 __all__ = ["read_response"]
@@ -95,11 +96,12 @@ def read_response(
     scale = real_number(scale, "scale", ReadError, "give a number, what 1 of the file is in SI units")
     if scale == 0.0:
         raise ReadError("scale is 0: give what 1 of the file is in SI units; a negative number turns the sign")
+    dt = None if dt is None else sample_time(dt)
     table = open_text(str(path), file, TextOptions(delimiter, decimal, skip, encoding))
     if table.batches is not None:
         raise ReadError(f"{path}: too long for a frequency response; give a table of frequencies, or read a log with read()")
-    found = _columns(table, dict(columns or {}))
-    asked = known_keys(units or {}, "units", list(UNITS), (), ReadError)
+    found = _columns(table, {} if columns is None else columns)
+    asked = known_keys({} if units is None else units, "units", list(UNITS), (), ReadError)
     at_zero = found["frequency"].whole() == 0.0
     values = {key: table.numbers(_without(column, at_zero), key) for key, column in found.items()}
     for key in ("magnitude", "real", "imaginary", "std"):
@@ -123,15 +125,17 @@ def read_response(
     notes = []
     if at_zero.any():
         notes.append(f"{table.path}: the row at 0 Hz is left out.")
-    if dt is not None and isinstance(dt, int | float) and dt > 0.0:
+    if dt is not None:
         below = frequency[order] < 0.5 / dt  # no decision: a formula: half the sampling frequency
         if not below.all():
             notes.append(f"{table.path}: {int(np.sum(~below))} rows from half the sampling frequency on are left out.")
             order = order[below]
     arrays: dict[str, Any] = {key: array[order] for key, array in more.items()}
     called = file.name if name is None else name
+    with np.errstate(over="ignore"):  # the response refuses what is not finite
+        response = scale * response[order]
     try:
-        return FrequencyResponse(frequency[order], scale * response[order], kind=kind, dt=dt, name=called, notes=notes, **arrays)
+        return FrequencyResponse(frequency[order], response, kind=kind, dt=dt, name=called, notes=notes, **arrays)
     except RecordError as error:
         raise ReadError(f"{table.path}: {error}") from None
 
