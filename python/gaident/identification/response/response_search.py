@@ -31,6 +31,7 @@ __all__ = ["ResponseSearch", "distinct_responses", "response_space", "told_of"]
 
 
 DIGITS = 1e-7  # no decision: rounding: of a value that is written with seven digits
+MS = 1e3  # no decision: a unit: s to ms
 MOST_LINES = 600  # no decision: memory and time: frequencies of a response, where a path is looked for
 STANDS_OUT = 2.0  # no decision: which peak a sentence speaks of: one of twice the median
 GIVES_POWER = (
@@ -295,7 +296,7 @@ def _said(path: dict[str, Estimate]) -> Text:
     """That the axis lies behind a path."""
     late = "the controller's computing, its bus" + ("" if "lag" in path else ", about the lag of its current loop")
     causes = {"delay": late, "lag": "the current loop, or a filter of the {torque}"}
-    there = [f"a {name} of {1e3 * e.value:.4g} +- {1e3 * e.std:.2g} ms ({causes[name]})" for name, e in path.items()]
+    there = [f"a {name} of {MS * e.value:.4g} +- {MS * e.std:.2g} ms ({causes[name]})" for name, e in path.items()]
     return say(f"The response is that of the axis behind {' and '.join(there)}, of which nothing was said.")
 
 
