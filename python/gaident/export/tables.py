@@ -22,12 +22,13 @@ def _pandas() -> Any:
 
 
 def identification_table(idn: Identification) -> Any:
-    """One row per parameter, those of the mechanics behind those of the model; see `Identification.to_pandas`.
+    """One row per parameter: of the model, of the torque's path, of the mechanics; see `Identification.to_pandas`.
 
     at_bound: of the mechanics, whether any parameter that they follow from sits at a bound of its search range.
     of_controller: 0, as the deviations of an identification are those under the controller that it uses.
     """
     rows = [{"of": "model", "parameter": name, **asdict(e)} for name, e in idn.parameters.items()]
+    rows += [{"of": "path", "parameter": name, **asdict(e)} for name, e in idn.path.items()]
     drive = idn.mechanics
     if drive is not None:
         bound = any(e.at_bound for e in idn.parameters.values())  # it follows from all of them

@@ -32,7 +32,7 @@ from gaident.results.settings import Settings
 from gaident.results.structures import Rival, Structure, TrialOutcome
 from gaident.version import version
 
-__all__ = ["PERCENT", "Assessed", "ProgressCallback", "StructureSearch"]
+__all__ = ["FINAL_TOLERANCE", "PERCENT", "Assessed", "ProgressCallback", "StructureSearch"]
 
 Vector = NDArray[np.float64]
 ProgressCallback = Callable[[float, str], None]
@@ -95,6 +95,14 @@ class StructureSearch(ABC):
     @abstractmethod
     def notes(self, best: Assessed) -> Sequence[str]:
         """What is doubtful about the data themselves, and about the model for such data."""
+
+    def reported(self, model: Model) -> Model:
+        """What the result says of a model of the search."""
+        return model
+
+    def spread(self, best: Assessed, of_model: Vector | None) -> Vector | None:
+        """Covariance of what the reported model has, from that of the model of the search."""
+        return of_model
 
     def search(self, trials: int, seed: int, progress: ProgressCallback | None) -> list[_core.Trial]:
         """The genetic runs."""
@@ -198,9 +206,10 @@ class StructureSearch(ABC):
         closer = lowest < bic - POLICY.rival_margin  # the reported one is the smallest mechanism
         close = [] if verdict.falsified or closer else scored
         close = [c for c in close if c.bic <= bic + POLICY.rival_margin and (c.p, c.q) != (model.p, model.q)]
-        rivals = sorted((Rival(c.p, c.q, c.bic - bic, c.model) for c in close), key=lambda r: r.delta_bic)
+        rivals = sorted((Rival(c.p, c.q, c.bic - bic, self.reported(c.model)) for c in close), key=lambda r: r.delta_bic)
+        spread = self.spread(best, usable)
         return Identification(
-            model=model,
+            model=self.reported(model),
             controller=self.controller,
             parameters=parameters,
             mechanics=mechanics,
@@ -214,7 +223,7 @@ class StructureSearch(ABC):
             settings=s,
             seed=seed,
             seconds=0.0,
-            covariance=None if usable is None else tuple(tuple(map(float, row)) for row in usable),
+            covariance=None if spread is None else tuple(tuple(map(float, row)) for row in spread),
             version=version(),
             **self.of_data(best),
         )

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from gaident.errors import ModelError
 from gaident.models.roots import quadratic_roots
 
-__all__ = ["LAG", "LATE", "LINEAR", "Transfer", "response_of"]
+__all__ = ["DELAY", "LAG", "LATE", "LINEAR", "Transfer", "response_of"]
 
 
 class Transfer(NamedTuple):
@@ -62,7 +62,7 @@ LINEAR: dict[str, Callable[[Sequence[float]], Transfer]] = {
 }
 """Effect -> its transfer function, from its parameters in the order of the table."""
 
-LAG = "torque_lag"  # of first order, of the torque: its parameter is time_constant
+DELAY, LAG = "transport_delay", "torque_lag"  # of the torque's path
 
 LATE: dict[str, Callable[[Sequence[float], float], float]] = {
     "velocity_difference": lambda values, period: 0.5 * values[0] * period,

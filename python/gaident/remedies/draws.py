@@ -9,13 +9,12 @@ from gaident.control.controller import Controller
 from gaident.data.signals.difference import is_difference_of_lines
 from gaident.errors import ModelError
 from gaident.models.drive_torque import HALF
-from gaident.models.effects_linear import LAG
 from gaident.models.factors import model_numbers, model_of_numbers
 from gaident.models.model import Model
 from gaident.results.diagnosis import Diagnosis
 from gaident.results.identification import Identification
 
-__all__ = ["age_of", "behind_lag", "drawn_models", "path_delay_of"]
+__all__ = ["age_of", "drawn_models"]
 
 TRIES = 20  # no decision: of a solver: draws for each drive, of which some are no drives
 
@@ -66,15 +65,3 @@ def age_of(result: Identification | Diagnosis, given: Controller) -> float:
     pairs = [(r, r.position) for r in result.records]
     made = pairs and all(q is not None and is_difference_of_lines(r.velocity, q, r.dt) for r, q in pairs)
     return HALF / given.log_every(result.records[0].dt) if made else 0.0
-
-
-def behind_lag(model: Model, result: Identification | Diagnosis) -> Model:
-    """A model behind the lag that frequency responses show beside it."""
-    lag = None if isinstance(result, Diagnosis) else result.lag
-    return model if lag is None else model.with_effect(LAG, time_constant=lag.value)
-
-
-def path_delay_of(result: Identification | Diagnosis) -> float:
-    """A delay [s] that frequency responses show beside the model: it is in the loop, too."""
-    delay = None if isinstance(result, Diagnosis) else result.delay
-    return 0.0 if delay is None else max(delay.value, 0.0)

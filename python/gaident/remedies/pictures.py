@@ -51,7 +51,7 @@ def loop_curves(result: Retuning) -> tuple[LoopCurves, LoopCurves]:
 
 
 def _curves(result: Retuning, name: str, controller: Controller) -> LoopCurves:
-    plants = sampled_plants([result.model.linear], result.period, controller.delay + result.path_delay, result.velocity_age > 0.0)
+    plants = sampled_plants([result.model.linear], result.period, controller.delay, result.velocity_age > 0.0)
     frequencies = frequencies_of(plants, POLICY.checked_points, POLICY.checked_near)
     loops = Loops(plants, cascade_of(controller), plants.responses(frequencies))
     hertz, L = loops.responses.omega[0] / (2.0 * np.pi), loops.L[0]

@@ -22,7 +22,7 @@ from gaident.models.effects_linear import LATE
 from gaident.models.model import Model
 from gaident.policy.table import POLICY
 from gaident.remedies.doubts import doubts_of, no_gains
-from gaident.remedies.draws import age_of, behind_lag, drawn_models, path_delay_of
+from gaident.remedies.draws import age_of, drawn_models
 from gaident.remedies.figures import Judge
 from gaident.remedies.loops import Loops, frequencies_of
 from gaident.remedies.nonlinear import simulated_with, without_each
@@ -130,15 +130,14 @@ def retune(
         raise SettingsError(f"seed is {seed!r}: give a whole number >= 0")
     age = age_of(result, given)
     axis = result.axis if isinstance(result, Diagnosis) else "rotary"
-    drawn = [behind_lag(model, result) for model in drawn_models(result, POLICY.checked_drives, seed)]
+    drawn = drawn_models(result, POLICY.checked_drives, seed)
     linear = [_with_what_is_late(model) for model in drawn]
     if linear[0].gain < 0.0 or linear[0].p < 1:
         raise SettingsError(
             f"the model of the result has gain {linear[0].gain:g} and p = {linear[0].p}: gains are proposed for a drive that a "
             "positive torque turns forwards, with more poles than zeros; change the sign of the torque, or identify again"
         )
-    path_delay = path_delay_of(result)
-    plants = sampled_plants(linear, period, given.delay + path_delay, age > 0.0)
+    plants = sampled_plants(linear, period, given.delay, age > 0.0)
     work = _Retuning(
         linear[0], given, period, age > 0.0, Search(plants.chosen(slice(0, POLICY.tuned_drives + 1)), asked.roomier())
     )
@@ -180,7 +179,6 @@ def retune(
         model=drawn[0],
         period=period,
         velocity_age=age,
-        path_delay=path_delay,
         noise=asked.noise,
         seed=seed,
         axis=axis,

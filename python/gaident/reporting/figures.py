@@ -13,7 +13,6 @@ from gaident.data.record import Record
 from gaident.diagnosis.explain.evidence import velocity_curve
 from gaident.errors import GaidentError
 from gaident.identification.response.averaged import response_of, responses_of
-from gaident.identification.response.path import Path
 from gaident.models.model import Model
 from gaident.reporting.runs import run_of
 from gaident.results.diagnosis import Diagnosis
@@ -70,10 +69,8 @@ def plot_frequency_response(
     model: Model | None = None,
     hz: bool = True,
     axis: str = "rotary",
-    delay: float = 0.0,
-    lag: float = 0.0,
 ) -> Figure:
-    """Measured frequency responses, all in one diagram, and the model that was found from them, behind a delay and a lag [s]."""
+    """Measured frequency responses, all in one diagram, and the model that was found from them."""
     checked_axis(axis)
     name = given[0].name if len(given) == 1 else ""
-    return response_plots.plot_response(responses_of(given, model, Path(delay, lag)), hz, axis, name)
+    return response_plots.plot_response(responses_of(given, model), hz, axis, name)

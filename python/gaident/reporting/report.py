@@ -18,7 +18,6 @@ from gaident.diagnosis.explain.evidence import velocity_curve
 from gaident.errors import GaidentError
 from gaident.files import check_writable, write_whole
 from gaident.identification.response.averaged import response_of, responses_of
-from gaident.identification.response.path import Path
 from gaident.reporting.remedies import remedies_of
 from gaident.reporting.runs import run_of
 from gaident.results.diagnosis import Diagnosis
@@ -186,8 +185,7 @@ def view_of(result: Diagnosis | Identification, records: Records, validation: Re
         except GaidentError as error:
             missing = message_of(error)
     elif isinstance(result, Identification) and result.responses:
-        path = Path(*(None if e is None else e.value for e in (result.delay, result.lag)))
-        response = responses_of(result.responses, result.model, path)
+        response = responses_of(result.responses, result.model)
     own = result.axis if isinstance(result, Diagnosis) else "rotary"
     return View(tuple(runs), curve, response, missing, axis or own, _made_with())
 

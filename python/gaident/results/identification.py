@@ -85,8 +85,8 @@ class Identification(SavedResult):
     controller_numbers : mapping of str to Estimate
         What was None of the controller, as the logged torque shows it; names as "kp" or "torque_filters[0].frequency".
     covariance : tuple of tuple of float, or None
-        Covariance of the natural parameters, in the order and units of `factor_parameters(model)`; None where the records leave
-        one open.
+        Covariance of the natural parameters, in the order and units of `factor_parameters(model)`, then of the parameters of its
+        effects in SI; None where the data leave one open.
     version : str
         Version of gaident.
     records : tuple of Record
@@ -94,7 +94,8 @@ class Identification(SavedResult):
     frequencies : int
         Frequencies of all responses. Of responses alone `samples` is 0 and `rmse` that of the relative error [1].
     delay, lag : Estimate or None
-        Of the torque's path [s], which the frequency responses contain beside the axis; None: none was needed.
+        Of the torque's path [s], which the frequency responses contain beside the axis, with their deviations; None: none was
+        needed. They are the effects `transport_delay` and `torque_lag` of `model`.
     response_digests : tuple of str
         Digests of the frequency responses, see `FrequencyResponse.digest`.
     responses : tuple of FrequencyResponse
@@ -149,6 +150,11 @@ class Identification(SavedResult):
     def q(self) -> int:
         """Zeros."""
         return self.model.q
+
+    @property
+    def path(self) -> dict[str, Estimate]:
+        """`delay` and `lag`, of those that were found."""
+        return {name: e for name, e in (("delay", self.delay), ("lag", self.lag)) if e is not None}
 
     @property
     def history(self) -> tuple[float, ...]:
@@ -290,8 +296,7 @@ class Identification(SavedResult):
             Where the record shows no frequency response.
         """
         if records is None and self.responses:
-            late = (0.0 if e is None else e.value for e in (self.delay, self.lag))
-            return picture("plot_frequency_response", self.responses, self.model, hz, axis, *late)
+            return picture("plot_frequency_response", self.responses, self.model, hz, axis)
         return picture("plot_bode", self.model, self.controller, self._chosen(records), hz, axis)
 
     def plot_poles(self, hz: bool = False) -> Figure:

@@ -177,8 +177,6 @@ class Retuning(SavedResult):
         Sample time of the controller [s].
     velocity_age : float
         See `Diagnosis.velocity_age`.
-    path_delay : float
-        Delay that frequency responses show beside the model [s].
     noise : float
         Standard deviation of the measured velocity's noise [rad/s].
     seed : int
@@ -221,7 +219,6 @@ class Retuning(SavedResult):
     noise: float
     seed: int
     axis: str = "rotary"
-    path_delay: float = 0.0
     torque_noise: float | None = None
     digests: tuple[str, ...] = ()
     version: str = ""
@@ -311,4 +308,4 @@ class Retuning(SavedResult):
 
 
 ASKED = ("phase_margin", "gain_margin", "torque_limit", "torque_noise", "step", "seed")
-FOUND = ("holds", "drives", "rule", "period", "velocity_age", "noise", "axis", "path_delay")
+FOUND = ("holds", "drives", "rule", "period", "velocity_age", "noise", "axis")

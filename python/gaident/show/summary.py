@@ -114,7 +114,9 @@ def _model(idn: Identification, axis: str) -> list[str]:
     stems = dict.fromkeys(stem_of(name) for name in idn.parameters if name != "gain")
     rows += [_root(idn.parameters, stem) for stem in stems]
     head = f"Model: gain K = {_estimate(gain)} {unit(gain.unit, axis)} {flags_of([gain])}".rstrip()
-    return [head, *(table(rows) if len(rows) > 1 else [])]
+    late = ", ".join(f"{name} {_estimate(e)} {e.unit} {flags_of([e])}".rstrip() for name, e in idn.path.items())
+    beside = [f"  Path of the {word('torque', axis)}: {late}"] if late else []
+    return [head, *(table(rows) if len(rows) > 1 else []), *beside]
 
 
 def stem_of(name: str) -> str:

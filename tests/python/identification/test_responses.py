@@ -119,6 +119,104 @@ def test_delay_and_lag_of_the_path_are_told_apart(late: float, lag: float) -> No
     assert again == idn and again.lag == idn.lag
 
 
+def test_deviations_of_a_lag_hold_where_the_noise_is_large() -> None:
+    """With 20 % of noise the mean error is chance, and the errors are as large as stated."""
+    lag, f = 0.4e-3, np.geomspace(5.0, 400.0, 300)
+    g = 1.0 / ((1e-3 + 2j * np.pi * f * 2e-4) * (1.0 + 2j * np.pi * f * lag))
+    off = []
+    for seed in range(16):
+        idn = ga.identify(ga.FrequencyResponse(f, noisy(g, 0.2, seed), 0.2 * np.abs(g)))
+        assert idn.lag is not None and idn.delay is None
+        off.append((idn.lag.value - lag) / idn.lag.std)
+    assert abs(np.mean(off)) < 3.0 / np.sqrt(len(off)) and 0.5 < np.std(off) < 1.5
+
+
+@pytest.mark.parametrize("count", [8, 9, 12])
+@pytest.mark.parametrize("stated", [True, False])
+def test_few_frequencies_behind_delay_and_lag_have_both(count: int, stated: bool) -> None:
+    """A delay alone leaves little there that a test would show, yet both are worth 60 units of BIC and more."""
+    f = np.geomspace(5.0, 400.0, count)
+    g = noisy(exact(f) * np.exp(-2j * np.pi * f * 0.3e-3) / (1.0 + 2j * np.pi * f * 0.2e-3), 0.01, 1)
+    idn = ga.identify(ga.FrequencyResponse(f, g, 0.01 * np.abs(g) if stated else None))
+    assert (idn.p, idn.q) == (1, 2) and not idn.falsified and idn.path.keys() == {"delay", "lag"}
+    for name, truth in (("delay", 0.3e-3), ("lag", 0.2e-3)):
+        assert abs(idn.path[name].value - truth) < 4.0 * idn.path[name].std < 6e-5
+
+
+@pytest.mark.parametrize("lag", [6e-3, 20e-3])
+@pytest.mark.parametrize("late", [0.0, 1e-3])
+def test_a_long_lag_is_found(late: float, lag: float) -> None:
+    g = noisy(exact() * np.exp(-2j * np.pi * F * late) / (1.0 + 2j * np.pi * F * lag), 0.01, 1)
+    idn = ga.identify(ga.FrequencyResponse(F, g, 0.01 * np.abs(g)))
+    within(idn)
+    assert idn.lag is not None and abs(idn.lag.value - lag) < 4.0 * idn.lag.std < 0.02 * lag
+    assert (idn.delay is None) == (late == 0.0)
+
+
+def held_late(f: np.ndarray, dt: float, late: float, lag: float) -> np.ndarray:
+    """The two masses behind a hold, a delay and a lag, from the matrix exponential over both parts of a sample."""
+    A, B, C = state_space()
+    if lag:
+        A, B, C = (
+            np.block([[A, B[:, None]], [np.zeros((1, 3)), np.full((1, 1), -1.0 / lag)]]),
+            np.eye(4)[3] / lag,
+            np.append(C, 0.0),
+        )
+    n = len(B)
+
+    def over(time: float) -> tuple[np.ndarray, np.ndarray]:
+        block = np.zeros((n + 1, n + 1))
+        block[:n, :n], block[:n, n] = A, B
+        whole = expm(block * time)
+        return whole[:n, :n], whole[:n, n]
+
+    samples, rest = divmod(late, dt)
+    (late_F, late_G), (early_F, early_G) = over(dt - rest), over(rest)
+    z = np.exp(2j * np.pi * f * dt)
+    answers = [C @ np.linalg.solve(v * np.eye(n) - late_F @ early_F, late_G + late_F @ early_G / v) for v in z]
+    return np.array(answers) * z**-samples
+
+
+@pytest.mark.parametrize(("late", "lag"), [(0.3e-3, 0.0), (1.5e-3, 0.0), (0.0, 0.4e-3), (1e-3, 2e-3), (0.5e-3, 0.4e-3)])
+def test_a_path_behind_a_hold_is_exact(late: float, lag: float) -> None:
+    """Behind a hold a delay is no exp(-j omega tau) of the sampled response, and a lag no factor."""
+    f = np.geomspace(5.0, 400.0, 80)
+    g = noisy(held_late(f, 1e-3, late, lag), 0.01, 3)
+    idn = ga.identify(ga.FrequencyResponse(f, g, 0.01 * np.abs(g), dt=1e-3))
+    within(idn)
+    truth = {name: value for name, value in (("delay", late), ("lag", lag)) if value}
+    assert idn.path.keys() == truth.keys()
+    for name, value in truth.items():
+        assert abs(idn.path[name].value - value) < 4.0 * idn.path[name].std < 2e-5
+
+
+def test_the_model_has_the_path_and_its_covariance() -> None:
+    """What is exported or simulated is the axis behind its path; the covariance is of all that was fitted."""
+    late, lag = 0.3e-3, 0.4e-3
+    g = noisy(exact() * np.exp(-2j * np.pi * F * late) / (1.0 + 2j * np.pi * F * lag), 0.01, 25)
+    idn = ga.identify(ga.FrequencyResponse(F, g, 0.01 * np.abs(g)))
+    assert idn.delay is not None and idn.lag is not None and idn.covariance is not None
+    assert [e.name for e in idn.model.effects] == ["transport_delay", "torque_lag"]
+    assert np.max(np.abs(idn.model.frequency_response(2.0 * np.pi * F) / g - 1.0)) < 0.05
+    covariance = np.array(idn.covariance)
+    assert covariance.shape == (len(ga.factor_parameters(idn.model)[1]) + 2,) * 2
+    np.testing.assert_allclose(np.sqrt(np.diag(covariance))[-2:], [idn.delay.std, idn.lag.std])
+    assert np.min(np.linalg.eigvalsh(covariance / np.sqrt(np.outer(np.diag(covariance), np.diag(covariance))))) > 0.0
+    # Delay and lag have one sum that is known better than either.
+    both = np.ones(2) @ covariance[-2:, -2:] @ np.ones(2)
+    assert np.sqrt(both) < 0.8 * min(idn.delay.std, idn.lag.std)
+    assert f"Path of the torque: delay {1e4 * idn.delay.value:.4f}"[:30] in idn.summary().replace("(", "")
+    gain = idn.parameters["gain"].std
+    assert gain == pytest.approx(np.sqrt(covariance[0, 0]), rel=1e-4)
+
+
+@pytest.mark.parametrize(("turn", "remedy"), [(np.negative, "opposite sign"), (np.conj, "conjugate")])
+def test_a_response_of_another_sign_behind_a_path_is_refused(turn: np.ufunc, remedy: str) -> None:
+    g = turn(noisy(exact() * np.exp(-2j * np.pi * F * 0.3e-3) / (1.0 + 2j * np.pi * F * 0.2e-3), 0.01, 1))
+    with pytest.raises(SpaceError, match=remedy):
+        ga.identify(ga.FrequencyResponse(F, g, 0.01 * np.abs(g)))
+
+
 def test_gains_are_designed_with_the_path_in_the_loop() -> None:
     """Behind a lag the loop is slower, and the model of the gains has it."""
     lag, loop = 2e-3, ga.PI(kp=0.02, ki=0.4)

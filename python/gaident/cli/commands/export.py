@@ -147,6 +147,7 @@ def _table(result: Diagnosis | Identification, axis: str) -> str:
                 ("mechanics", n, Estimate(getattr(m, n), m.std.get(n, math.nan), u)) for n, u in m.UNITS.items() if hasattr(m, n)
             ]
         rows += [("model", name, e) for name, e in result.parameters.items()]
+        rows += [("path", name, e) for name, e in result.path.items()]
     rows += [("controller", name, e) for name, e in result.controller_numbers.items()]
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")

@@ -28,7 +28,7 @@ from gaident.control.pi_torque import pi_torque
 from gaident.data.frequency.response import FrequencyResponse
 from gaident.data.record import Record
 from gaident.errors import RecordError
-from gaident.identification.response.path import NO_PATH, Path
+from gaident.models.discrete import held_response
 from gaident.models.held_torque import held_mean
 from gaident.models.model import Model
 from gaident.models.simulate import Run, run
@@ -66,8 +66,8 @@ def response_of(rec: Record, model: Model, controller: PI | None = None) -> Resp
     )
 
 
-def responses_of(given: Sequence[FrequencyResponse], model: Model | None, path: Path = NO_PATH) -> Responses:
-    """The same of responses that were given, all in one, and of a model behind a path; None: without a model."""
+def responses_of(given: Sequence[FrequencyResponse], model: Model | None) -> Responses:
+    """The same of responses that were given, all in one, and of a model; None: without one."""
     frequency = np.concatenate([r.frequency_hz for r in given])
     order = np.argsort(frequency, kind="stable")
     value = np.concatenate([r.velocity_response for r in given])
@@ -84,8 +84,8 @@ def responses_of(given: Sequence[FrequencyResponse], model: Model | None, path: 
     dt = next((r.dt for r in given if r.dt is not None), None)
     if dt is not None:
         fine = fine[fine < 0.5 / dt]  # no decision: a formula: half the sampling frequency
-    own = model.mechanism.frequency_response(2.0 * np.pi * fine) if dt is None else sampled_response(model, fine, dt)
-    return Responses(measured, None, fine, own / path.inverse(2.0 * np.pi * fine))
+    own = model.linear.frequency_response(2.0 * np.pi * fine) if dt is None else sampled_response(model, fine, dt)
+    return Responses(measured, None, fine, own)
 
 
 def _fine(model: Model, low: float, high: float) -> Vector:
@@ -131,10 +131,7 @@ def sampled_response(model: Model, frequency: Vector, dt: float, controller: PI 
     omega = 2.0 * np.pi * frequency
     if controller is not None and controller.loop == "continuous":
         return model.mechanism.frequency_response(2.0 / dt * np.tan(0.5 * omega * dt))
-    equation = model.mechanism.discrete(dt)
-    back = np.exp(-1j * np.outer(omega * dt, np.arange(len(equation.alpha))))
-    response: Complex = (back @ equation.alpha) / (1.0 - back[:, 1:] @ equation.beta)
-    return response
+    return held_response(model, omega, dt)
 
 
 def _constant(x: Vector) -> bool:

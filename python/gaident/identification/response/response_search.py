@@ -4,24 +4,26 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from gaident import _core
-from gaident.axis import Text, say
 from gaident.control import core
 from gaident.data.frequency.response import FrequencyResponse
 from gaident.errors import RecordError, SettingsError, SpaceError
 from gaident.estimation.criterion import bic
-from gaident.identification import selection
+from gaident.identification import covariance, selection
 from gaident.identification.noise import Autoregression
-from gaident.identification.response.path import LONGEST, NO_PATH, SMALL, STEPS, Path, Turned, freed, path_step, starts, with_lag
+from gaident.identification.response.path import NO_PATH, Path, Together, fitted, is_start, lags_after, starts, with_lag
+from gaident.identification.response.response_notes import GIVES_POWER, NO_STD, compared_notes, path_note
 from gaident.identification.response.weighed import assessed_responses, weighed
 from gaident.identification.selection import Candidate
-from gaident.identification.structure_search import PERCENT, Assessed, ProgressCallback, StructureSearch
+from gaident.identification.structure_search import FINAL_TOLERANCE, PERCENT, Assessed, ProgressCallback, StructureSearch
+from gaident.models.model import Model
 from gaident.models.search_space import SearchSpace
 from gaident.policy.table import POLICY
 from gaident.results.estimate import Estimate
@@ -29,15 +31,11 @@ from gaident.results.settings import Settings
 
 __all__ = ["ResponseSearch", "distinct_responses", "response_space", "told_of"]
 
+Matrix = NDArray[np.float64]
 
 DIGITS = 1e-7  # no decision: rounding: of a value that is written with seven digits
-MS = 1e3  # no decision: a unit: s to ms
 MOST_LINES = 600  # no decision: memory and time: frequencies of a response, where a path is looked for
-STANDS_OUT = 2.0  # no decision: which peak a sentence speaks of: one of twice the median
-GIVES_POWER = (
-    "The model gives power at some frequencies, which no chain of masses does that is driven and measured at the motor: take no "
-    "mechanics from it. A sensor at the load would do that."
-)
+MOST = 0.5  # no decision: a formula: more than half
 GIVEN = 0.1  # no decision: rounding: of |G|, by which errors of a response make a real part negative
 
 
@@ -88,8 +86,49 @@ def _thinned(r: FrequencyResponse) -> FrequencyResponse:
     return FrequencyResponse(r.frequency_hz[::every], r.response[::every], std, coherence, r.kind, dt=r.dt)
 
 
+@dataclass(frozen=True)
+class _Behind:
+    """A chain of masses behind a path. rival: another path with as many unknowns that fits as well."""
+
+    together: Together
+    fit: Candidate
+    holds: bool
+    rival: Path | None = None
+
+    @property
+    def path(self) -> Path:
+        return self.together.path
+
+    @property
+    def q(self) -> int:
+        return self.fit.q
+
+    @property
+    def bic(self) -> float:
+        return self.fit.bic
+
+    @property
+    def size(self) -> int:
+        return self.fit.size + len(self.path.unknowns)
+
+
+def _simplest(found: Sequence[_Behind]) -> _Behind:
+    """The smallest within the margin of the least BIC, as among structures."""
+    least = min(one.bic for one in found)
+    close = sorted((one for one in found if one.bic <= least + POLICY.rival_margin), key=lambda one: (one.size, one.bic))
+    best = close[0]
+    others = [one.path for one in close if one.size == best.size and one.q == best.q and one.path.unknowns != best.path.unknowns]
+    return replace(best, rival=others[0]) if others else best
+
+
 class ResponseSearch(StructureSearch):
-    """The search for the model behind frequency responses."""
+    """The search for the model behind frequency responses.
+
+    path, together  what lies in front of the axis, and with the axis as they were fitted last
+    """
+
+    path: Path
+    together: Together | None
 
     def __init__(self, responses: Sequence[FrequencyResponse], space: SearchSpace, settings: Settings, workers: int) -> None:
         if settings.arithmetic != "double":
@@ -100,12 +139,14 @@ class ResponseSearch(StructureSearch):
         self.responses = list(responses)
         self.count = self.searched_count = 2 * sum(len(r) for r in self.responses)
         self.runs = 1, 0
+        self.rival: Path | None = None
         self._behind(NO_PATH)
 
-    def _behind(self, path: Path) -> None:
-        """Take out a path of the torque."""
-        self.path = path
-        self.parts = [replace(w, path=path) for w in weighed(self.responses, continuous=False, scale=1.0)]
+    def _behind(self, path: Path, axis: Model | None = None) -> None:
+        """Take out a path of the torque; axis: what lies behind it, where a response has a hold."""
+        self.path, self.together = path, None
+        parts = weighed(self.responses, continuous=False, scale=1.0)
+        self.parts = [replace(w, turned=path.inverse(w.response, axis)) for w in parts] if path.unknowns else parts
         self.experiment = self.searched = core.experiment([], None, 1.0, responses=[p.core() for p in self.parts])
 
     def search(self, trials: int, seed: int, progress: ProgressCallback | None) -> list[_core.Trial]:
@@ -116,19 +157,23 @@ class ResponseSearch(StructureSearch):
     def select(self, found: list[_core.Trial]) -> tuple[Assessed, list[Candidate]]:
         """See `StructureSearch`; where no chain of masses holds, one behind a delay and a lag is looked for."""
         best, scores = super().select(found)
-        if self.path.unknowns or not scores:
+        if not scores:
             return best, scores
         # A chain behind a path is smaller than what makes up for one: it wins within the margin, as the smallest does.
         enough = min(c.bic for c in scores) + POLICY.rival_margin
         if best.candidate.bic <= enough and self.holds(best.candidate):
             return best, scores
-        path = self._best_path(enough)
-        if path is None:
+        behind = self._best_path(enough)
+        if behind is None or not behind.holds:
             self._refuse_other_signs()
+        if behind is None:
             return best, scores
-        self._behind(path)
+        self._behind(behind.path, behind.fit.model)
         found[:] = super().search(*self.runs, None)
-        return super().select(found)
+        best, scores = super().select(found)
+        self.rival = behind.rival
+        done = self._with_path(behind.path, best.candidate, final=True) or self._behind_again(behind.together)
+        return self.assessed(replace(done.fit, bic=best.candidate.bic)), scores
 
     def holds(self, c: Candidate) -> bool:
         """Whether a candidate is a chain of masses that the data do not contradict.
@@ -156,74 +201,115 @@ class ResponseSearch(StructureSearch):
                 FrequencyResponse(r.frequency_hz, turned(r.response), r.std, r.coherence, r.kind, dt=r.dt) for r in self.responses
             ]
             work = ResponseSearch(made, self.space, self.settings, self.workers)
-            best = super(ResponseSearch, work).select(work.search(*self.runs, None))[0]
-            if work.holds(best.candidate):
-                held.append((best.candidate.cost, what))
+            best, scores = super(ResponseSearch, work).select(work.search(*self.runs, None))
+            late: Candidate | None = best.candidate
+            if not work.holds(best.candidate):
+                # The phase of an axis behind a path falls below 0 at most frequencies.
+                lags = np.mean([np.mean(r.velocity_response.imag < 0.0) for r in made]) > MOST
+                path = work._best_path(min(c.bic for c in scores) + POLICY.rival_margin) if lags else None
+                late = path.fit if path is not None and path.holds else None
+            if late is not None:
+                held.append((late.cost, what))
         if held:
             raise SpaceError(f"the response {min(held)[1]}")
 
-    def _best_path(self, less_than: float) -> Path | None:
-        """The path of the first chain of masses that holds behind one, else of the least BIC; None: none below that."""
+    def _best_path(self, less_than: float) -> _Behind | None:
+        """The first chain of masses that holds behind a path, or a better one that is larger; else that of the least BIC.
+
+        None: none is below `less_than`.
+        """
         few = [_thinned(r) for r in self.responses]
         work, whole = (ResponseSearch(of, self.space, self.settings, self.workers) for of in (few, self.responses))
-        begin = [Path(delay) for delay in starts(self._highest)]
-        least: dict[int, tuple[float, Path]] = {}  # of each chain of masses
+        begin = starts(self._highest)
+        least: dict[int, _Behind] = {}  # of each chain of masses
         while begin:
-            better: dict[int, Path] = {}
-            for path, c in work._chains_behind(begin.pop(0)):
-                whole._behind(path)
-                fit = whole.refined(c)
-                cost = bic(fit.cost / whole.count, whole.count, fit.size + len(path.unknowns))
-                if cost < less_than and whole.holds(fit):
-                    return path
-                if c.q not in least or cost < least[c.q][0] - POLICY.rival_margin:
-                    least[c.q], better[c.q] = (cost, path), path
+            better: list[_Behind] = []
+            for found in work._chains_behind(begin.pop(0)):
+                one = whole._with_path(found.path, found.fit, final=True)
+                if one is None or one.bic >= less_than:
+                    continue
+                one = replace(one, rival=found.rival)
+                if one.holds:
+                    return whole._largest(work, one)
+                if one.q not in least or one.bic < least[one.q].bic - POLICY.rival_margin:
+                    least[one.q] = one
+                    better.append(one)
             # Behind a better path the structures are searched anew: from a wrong one the larger do not find their way.
-            begin[:0] = [better[q] for q in sorted(better)]
-        cost, path = min(least.values(), key=lambda found: found[0], default=(math.inf, NO_PATH))
-        return path if cost < less_than else None
+            begin[:0] = [one.path for one in sorted(better, key=lambda one: one.bic)]
+        return min(least.values(), key=lambda one: one.bic, default=None)
 
-    def _chains_behind(self, begin: Path) -> Iterator[tuple[Path, Candidate]]:
-        """Chains of masses with their paths, from a path on."""
+    def _largest(self, work: ResponseSearch, best: _Behind) -> _Behind:
+        """A larger chain behind the path of one that holds, where its BIC is lower by the margin, else that one."""
+        for found in work._chains_behind(best.path, best.q + 1):
+            one = self._with_path(found.path, found.fit, final=True)
+            if one is not None and one.holds and one.bic < best.bic - POLICY.rival_margin:
+                return self._largest(work, replace(one, rival=found.rival))
+        return best
+
+    def _chains_behind(self, begin: Path, q: int = 0) -> Iterator[_Behind]:
+        """Each chain of masses behind the simplest path that fits it as well as any, from a path on, the smallest chain first.
+
+        q: zeros that it has at least.
+        """
         self._behind(begin)
         scores = super().select(self.search(*self.runs, None))[1]
-        # The smallest first: a larger structure takes a part of the path for itself.
-        for c in sorted(filter(selection.is_chain, scores), key=lambda c: c.size):
-            # A delay alone, a lag alone, then both: the simpler path that holds is taken.
-            late, fitted = self._with_path(begin, c)
-            if late.unknowns:
-                yield late, fitted
-            for start in with_lag(late) if late.lag is None else ():
-                path, fit = self._with_path(start, fitted)
-                if path.unknowns:
-                    yield path, fit
+        chains = {c.q: c for c in scores if selection.is_chain(c) and c.q >= q}
+        lagged = {c.q: c for c in scores if c.p == 2}
+        for q in sorted(chains):
+            fits: list[_Behind | None] = []
+            if begin.unknowns:
+                late = self._with_path(Path(begin.total), chains[q])
+                total, start = (begin.total, chains[q]) if late is None else (late.path.total, late.fit)
+                fits += [late, *(self._with_path(path, start) for path in with_lag(total))]
+            if q in lagged:
+                self._behind(begin)
+                more = [self._with_path(path, c) for path, c in self._of_a_pole(begin, lagged[q])]
+                totals = [(fit.path.total, fit.fit) for fit in more if fit is not None]
+                fits += [*more, *(self._with_path(Path(t), c) for t, c in totals if is_start(t, self._highest))]
+            found = [fit for fit in fits if fit is not None]
+            if found:
+                yield _simplest(found)
+
+    def _of_a_pole(self, begin: Path, c: Candidate) -> list[tuple[Path, Candidate]]:
+        """Chains of masses behind a lag that was a pole of a structure: the fastest real one."""
+        model = c.model
+        reals = [r for r in model.poles if r.imag == 0.0 and r.real < 0.0]
+        if not reals:
+            return []
+        pole = min(reals, key=lambda r: r.real)
+        poles = list(model.poles)
+        poles.remove(pole)
+        lag = -1.0 / pole.real
+        start = model.gain * lag, np.array(poles, complex), np.array(model.zeros, complex), np.zeros(0)
+        chain = Candidate(self.experiment.refine([start], self.ranges, [], 0, 1)[0])
+        return [(path, chain) for path in lags_after(begin.delay, lag, self._highest)]
 
     @property
     def _highest(self) -> float:
         return max(float(r.omega[-1]) for r in self.responses)
 
-    def _with_path(self, path: Path, c: Candidate) -> tuple[Path, Candidate]:
-        """Path and chain of masses fitted together, from a path on."""
-        self._behind(path)
-        c = self.refined(c)
-        for _ in range(STEPS):
-            if not self.path.unknowns:
-                break
-            step = path_step(self._turned(c))[0]
-            phase = float(np.max(np.abs(step))) * self._highest
-            self._behind(self.path.moved(step / max(1.0, phase / LONGEST)))
-            c = self.refined(c)
-            if phase < SMALL:
-                break
-        return self.path, c
+    def _with_path(self, path: Path, c: Candidate, final: bool = False) -> _Behind | None:
+        """Path and chain of masses fitted together, from a path on, which is taken out then; None: there is no such path."""
+        together = fitted(self.parts, c.model, path, FINAL_TOLERANCE if final else selection.tolerance(self.count))
+        return None if together is None else self._behind_again(together)
 
-    def _turned(self, c: Candidate) -> Turned:
-        error, columns, _ = self.experiment.sensitivities(c.fit.gain, c.fit.poles, c.fit.zeros, [], [])
-        of_path = [
-            np.concatenate([p.weight * p.value * p.path.derivatives(p.response.omega)[i] for p in self.parts])
-            for i in range(len(self.path.unknowns))
-        ]
-        return Turned(error, columns, np.array([np.stack([z.real, z.imag], axis=1).ravel() for z in of_path]))
+    def _behind_again(self, together: Together) -> _Behind:
+        """What was fitted together, as a candidate behind its path."""
+        self._behind(together.path, together.axis)
+        self.together = together
+        axis = together.axis
+        start = axis.gain, np.array(axis.poles, complex), np.array(axis.zeros, complex), np.zeros(0)
+        c = Candidate(self.experiment.refine([start], self.ranges, [], 0, 1)[0])
+        (scored,) = self.scored([c], self.noise_of(c))
+        return _Behind(together, scored, self.holds(scored))
+
+    def reported(self, model: Model) -> Model:
+        """See `StructureSearch`: behind the path."""
+        return self.path.behind(model)
+
+    def spread(self, best: Assessed, of_model: Matrix | None) -> Matrix | None:
+        """See `StructureSearch`: with the path's unknowns."""
+        return of_model if self.together is None else self.together.covariance(best.noise_std)
 
     @property
     def rounding(self) -> float:
@@ -238,14 +324,15 @@ class ResponseSearch(StructureSearch):
         """See `StructureSearch`."""
         costs = [c.cost if c.cost > self.rounding else self.rounding for c in candidates]
         return [
-            selection.charged(c, bic(cost / self.count, self.count, c.size)) for c, cost in zip(candidates, costs, strict=True)
+            selection.charged(c, bic(cost / self.count, self.count, c.size + len(self.path.unknowns)))
+            for c, cost in zip(candidates, costs, strict=True)
         ]
 
     def assessed(self, c: Candidate) -> Assessed:
         """See `StructureSearch`; deviations are those that are stated, or larger where what is left is."""
         plain = self.experiment.fit_sums(c.fit, [], [], 0.0)[0]
-        if self.path.unknowns:
-            plain = freed(self._turned(c), plain)
+        if self.together is not None:
+            plain = self.together.freed(covariance.core_layout(self.together.axis)[0])
         verdict = assessed_responses(self.parts, c.model, c.size + len(self.path.unknowns))
         verdict = replace(verdict, falsified=verdict.falsified and c.cost > self.rounding)
         known = all(p.known for p in self.parts)
@@ -270,77 +357,20 @@ class ResponseSearch(StructureSearch):
 
     def found_path(self, best: Assessed) -> dict[str, Estimate]:
         """Delay and lag of the path with their deviations, where there are any."""
-        if not self.path.unknowns:
+        if self.together is None:
             return {}
-        std = best.noise_std * np.sqrt(np.diag(path_step(self._turned(best.candidate))[1]))
-        values = [getattr(self.path, name) for name in self.path.unknowns]
-        made = [Estimate(value, float(off), "s", False, bool(off < value)) for value, off in zip(values, std, strict=True)]
+        values, spread = self.path.values, self.together.covariance(best.noise_std)
+        std = np.full(len(values), math.inf) if spread is None else np.sqrt(np.diag(spread)[-len(values) :])
+        made = [Estimate(float(v), float(off), "s", False, bool(off < v)) for v, off in zip(values, std, strict=True)]
         return dict(zip(self.path.unknowns, made, strict=True))
 
     def notes(self, best: Assessed) -> Sequence[str]:
         """See `StructureSearch`."""
         found: list[str] = [note for r in self.responses for note in r.notes]
         if any(r.std is None for r in self.responses):
-            found.append(
-                "A response without standard deviations (std): how large its errors are is taken from what the model leaves, and "
-                "whether they are as large as they should be cannot be tested."
-            )
+            found.append(NO_STD)
         if self.path.unknowns:
-            found.append(_said(self.found_path(best)))
+            found.append(path_note(self.found_path(best), self.rival))
         if selection.is_chain(best.candidate) and self.gives_power(best.candidate):
             found.append(GIVES_POWER)
         return list(dict.fromkeys(found)) + compared_notes(self.responses)
-
-
-def _said(path: dict[str, Estimate]) -> Text:
-    """That the axis lies behind a path."""
-    late = "the controller's computing, its bus" + ("" if "lag" in path else ", about the lag of its current loop")
-    causes = {"delay": late, "lag": "the current loop, or a filter of the {torque}"}
-    there = [f"a {name} of {MS * e.value:.4g} +- {MS * e.std:.2g} ms ({causes[name]})" for name, e in path.items()]
-    return say(f"The response is that of the axis behind {' and '.join(there)}, of which nothing was said.")
-
-
-def compared_notes(responses: Sequence[FrequencyResponse]) -> list[Text]:
-    """What responses of one axis at several amplitudes say about its linearity: a hint, and no name.
-
-    The smallest amplitude is set beside the largest: |G| omega in the lowest third of the band that both have, and the
-    frequency of its peak.
-    """
-    told = sorted((r for r in responses if r.amplitude is not None), key=lambda r: r.amplitude or 0.0)
-    if len(told) < 2:
-        return []
-    small, large = told[0], told[-1]
-    low, high = max(small.omega[0], large.omega[0]), min(small.omega[-1], large.omega[-1])
-    if not high > low:
-        return []
-    curves = []
-    for r in (small, large):
-        inside = (r.omega >= low) & (r.omega <= high)
-        curves.append((r.omega[inside], (np.abs(r.velocity_response) * r.omega)[inside], r.relative_std[inside]))
-    if min(len(omega) for omega, _, _ in curves) < 3:  # no decision: a formula: a third of them is one at least
-        return []
-    gains, errors, peaks, spacing = [], [], [], []
-    for (omega, size, off), r in zip(curves, (small, large), strict=True):
-        part = len(omega) // 3  # no decision: which part the sentence speaks of
-        gains.append(float(np.median(size[:part])))
-        # A median's deviation is sqrt(pi/2) that of a mean.
-        stated = float(np.median(off[:part])) if r.std is not None else float(np.std(np.log(size[:part])))
-        errors.append(math.sqrt(0.5 * math.pi / part) * stated)
-        at = int(np.argmax(size))
-        # A resonance stands out of |G| omega, which is flat for a rigid axis, and inside the band.
-        if 0 < at < len(size) - 1 and size[at] > STANDS_OUT * float(np.median(size)):
-            peaks.append(float(omega[at]) / math.tau)
-            spacing.append(float(np.ptp(omega[at - 1 : at + 2])) / math.tau)
-    change, off_by = gains[1] / gains[0] - 1.0, POLICY.contradiction * math.hypot(*errors)
-    between = f"Not linear: with {{torque}} of {large.amplitude:.3g} instead of {small.amplitude:.3g} N m"
-    last = "Record a motion and diagnose it to know the cause."
-    found = []
-    if abs(change) > off_by:
-        way, why = ("larger", "dry friction or a dead band") if change > 0.0 else ("smaller", "a limit of the {torque}")
-        gain = f"the gain at low frequencies is {PERCENT * abs(change):.2g} % {way}"
-        found.append(say(f"{between} {gain}; {why} would do that. {last}"))
-    if len(peaks) == len(curves) and abs(peaks[1] - peaks[0]) > max(spacing):
-        why = "a gap or a hardening coupling" if peaks[1] > peaks[0] else "friction in the coupling or a softening one"
-        moved = f"the peak moves from {peaks[0]:.4g} to {peaks[1]:.4g} Hz"
-        found.append(say(f"{between} {moved}; {why} would do that. {last}"))
-    return found

@@ -19,7 +19,6 @@ from numpy.typing import NDArray
 from gaident import _core
 from gaident.data.frequency.response import FrequencyResponse
 from gaident.identification.noise import autocorrelation, chi2_tail, ljung_box_of
-from gaident.identification.response.path import NO_PATH, Path
 from gaident.models.model import Model
 from gaident.policy.table import POLICY
 from gaident.results.adequacy import Adequacy
@@ -36,14 +35,15 @@ NEIGHBOURS = 5  # no decision: a grid: frequencies apart at most; what a missing
 class Weighed:
     """A response with the deviation that counts, over its magnitude: `relative_std` times `size`, 1 where a deviation is stated.
 
-    continuous: whether the loop beside it is the paper's, in which the plant is bilinear. path: of its torque, taken out.
+    continuous: whether the loop beside it is the paper's, in which the plant is bilinear.
+    turned: 1/H of its torque's path, by which the path is taken out; 1: there is none.
     """
 
     response: FrequencyResponse
     size: float
     scale: float
     continuous: bool
-    path: Path = NO_PATH
+    turned: Complex | float = 1.0
 
     @property
     def known(self) -> bool:
@@ -53,7 +53,7 @@ class Weighed:
     @property
     def value(self) -> Complex:
         """From torque to velocity, without the path."""
-        made: Complex = self.response.velocity_response * self.path.inverse(self.response.omega)
+        made: Complex = self.response.velocity_response * self.turned
         return made
 
     @property

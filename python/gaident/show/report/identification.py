@@ -138,6 +138,8 @@ def _parameters(idn: Identification, view: View, drawn: Charts) -> Section:
     stems = dict.fromkeys(stem_of(name) for name in idn.parameters if name != "gain")
     columns = ("", "real part [rad/s]", "imaginary part [rad/s]", "frequency [Hz]", "damping ratio", "")
     parts.append(table(columns, [[_root(idn.parameters, stem) for stem in stems]]))
+    late = [[(name, estimate(e.value, e.std), e.unit, flags_of([e])) for name, e in idn.path.items()]]
+    parts.append(table((f"Path of the {word('torque', axis)}", "value", "unit", ""), late) if idn.path else "")
     parts.append(tag("p", tag("small", "± is one standard deviation, the colour of the noise taken into account.")))
     parts.append(drawn.put(roots_chart(idn)))
     parts.append("" if idn.of_responses else response_part(view, drawn))
