@@ -11,6 +11,9 @@ from pathlib import Path
 
 from gaident.errors import GaidentError
 
+LARGEST = 1e30  # no decision: what an argument may be: far beyond counters of 64 bits, far below where squares overflow
+SHORTEST, LONGEST = 1e-12, 1e9  # no decision: what an argument may be: sample times [s]
+
 
 def real_number(value: object, name: str, error: type[GaidentError], remedy: str = "give one finite number") -> float:
     """`value` as a finite float; raises `error` naming `name`, the value and the remedy."""
@@ -33,6 +36,27 @@ def above_zero(value: object, name: str, error: type[GaidentError], remedy: str)
     return number
 
 
+def size_of_drive(value: object, name: str, error: type[GaidentError], remedy: str) -> float:
+    """`value` as a float above 0 that a drive can have, a bool left out: a number beyond all sizes is mostly a wrong unit."""
+    if isinstance(value, bool):
+        raise error(f"{name} is {value}: {remedy}")
+    number = real_number(value, name, error, remedy)
+    if number <= 0.0:
+        raise error(f"{name} is {number:g}: {remedy}")
+    if not 1.0 / LARGEST <= number <= LARGEST:
+        raise error(f"{name} is {number:g}, which no drive has ({1.0 / LARGEST:g} to {LARGEST:g}): {remedy}")
+    return number
+
+
+def time_of_sample(value: object, error: type[GaidentError], what: str = "the sample time") -> float:
+    """`value` of an argument dt [s], where a drive can have it; raises `error`."""
+    remedy = f"give {what} in s, from {SHORTEST:g} to {LONGEST:g}"
+    dt = above_zero(value, "dt", error, remedy)
+    if not SHORTEST <= dt <= LONGEST:
+        raise error(f"dt is {dt:g}: {remedy}")
+    return dt
+
+
 def yes_or_no(value: object, name: str, error: type[GaidentError]) -> bool:
     """`value`, where it is True or False."""
     if not isinstance(value, bool):
@@ -45,6 +69,8 @@ def checked_path(value: object, name: str = "path", error: type[GaidentError] = 
     text = os.fspath(value) if isinstance(value, str | os.PathLike) else None
     if not isinstance(text, str):
         raise error(f"{name} is {value!r:.80}: give the file's name as str or pathlib.Path")
+    if not text:
+        raise error(f"{name} is '', which names no file or folder: give its name")
     if "\0" in text:
         raise error(f"{name} is {text!r:.80}: no file's name contains the character NUL; correct it")
     return Path(text)

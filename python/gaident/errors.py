@@ -66,6 +66,8 @@ class GaidentError(ValueError):
 
 def check_schema(data: Mapping[str, object], schema: str, version: int) -> None:
     """Raise GaidentError where saved data are not of this schema and version; says which they are."""
+    if not isinstance(data, Mapping):
+        raise GaidentError(f"data is {data!r:.80}: give the dictionary that to_dict gave")
     if data.get("schema") != schema:
         raise GaidentError(f"schema is {data.get('schema')!r}: this is not a saved {schema.removeprefix('gaident/')}")
     found = data.get("schema_version")

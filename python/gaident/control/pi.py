@@ -241,7 +241,7 @@ class PI(Controller):
 
     def with_limits(self, torque: float | None, integrator: float | None) -> PI:
         """See `Controller`; without a torque limit there is nothing for an anti-windup to act at."""
-        torque, integrator = (None if x is None or math.isinf(x) else x for x in (torque, integrator))
+        torque, integrator = (None if isinstance(x, float) and x == math.inf else x for x in (torque, integrator))
         limited = self.winding_up if torque is None else self
         return replace(limited, torque_limit=torque, integrator_limit=integrator)
 

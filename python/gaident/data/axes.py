@@ -18,6 +18,9 @@ from gaident.errors import ReadError, RecordError
 
 __all__ = ["read_axes"]
 
+CHANNEL_BY_CHANNEL = ("columns", "units", "shift")
+"""Arguments that are mappings, of which an axis may have a part of its own."""
+
 
 def read_axes(path: str | os.PathLike[str] | Any, axes: Mapping[str, Mapping[str, Any]], **common: Any) -> dict[str, Record]:
     """Read several axes of one log, each to a Record, in the order given.
@@ -59,13 +62,18 @@ def read_axes(path: str | os.PathLike[str] | Any, axes: Mapping[str, Mapping[str
     """
     if not isinstance(axes, Mapping) or not axes or not all(isinstance(own, Mapping) for own in axes.values()):
         raise ReadError(f"axes={axes!r:.80} is no mapping of axes; give axes={{'x': {{'velocity': 'axis1.w', ...}}, ...}}")
+    for key in CHANNEL_BY_CHANNEL:
+        for given, where in ((common, ""), *((own, f"axis {name!r}: ") for name, own in axes.items())):
+            value = given.get(key)
+            if value is not None and not isinstance(value, Mapping):
+                raise ReadError(f"{where}{key} is {value!r:.80}: give a mapping of channels, {{'velocity': ...}}, or None")
     text = {key: common.pop(key, None) for key in TextOptions.__dataclass_fields__}
     found = {}
     with open_log(path, TextOptions(**text)) as table:
         stem = "" if is_frame(path) else Path(path).stem
         for name, own in axes.items():
             asked = dict(common) | {key: value for key, value in own.items() if key not in QUANTITIES}
-            for key in ("columns", "units", "shift"):
+            for key in CHANNEL_BY_CHANNEL:
                 asked[key] = {**(common.get(key) or {}), **(own.get(key) or {})} or None
             asked["columns"] = {**(asked["columns"] or {}), **{k: v for k, v in own.items() if k in QUANTITIES}} or None
             try:

@@ -19,7 +19,7 @@ from importlib.resources import files
 from typing import Any
 
 from gaident.axis import Text, checked_axis, said, say, velocity_unit
-from gaident.checks import checked_path, real_number
+from gaident.checks import checked_path, time_of_sample
 from gaident.control import core
 from gaident.control.pi import PI, checked_pi
 from gaident.errors import ModelError
@@ -80,9 +80,7 @@ def c_source(model: Model, dt: float, controller: PI | None, name: str, substeps
 
 
 def _checked(model: Model, dt: float, controller: PI | None, name: str, substeps: int | None) -> None:
-
-    if real_number(dt, "dt", ModelError, "give the sample time in s, > 0") <= 0.0:
-        raise ModelError(f"dt is {dt:g}: give the sample time in s, > 0")
+    time_of_sample(dt, ModelError)
     checked_pi(controller, "C source is written")
     if not isinstance(name, str) or not re.fullmatch(r"[A-Za-z_][A-Za-z0-9_]*", name):
         raise ModelError(f"name is {name!r}: give what C takes as a name, letters, digits and _")

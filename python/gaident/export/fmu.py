@@ -27,7 +27,7 @@ from xml.etree import ElementTree
 
 from gaident.arguments import arg
 from gaident.axis import checked_axis, said, say, unit
-from gaident.checks import checked_path
+from gaident.checks import checked_path, yes_or_no
 from gaident.control.pi import PI
 from gaident.errors import ModelError
 from gaident.export.c_source import c_name, c_source
@@ -115,8 +115,9 @@ def to_fmu(
     target = checked_path(path, error=ModelError)
     if target.suffix != ".fmu":
         raise ModelError(f"path is {str(target)!r}: an FMU has the ending .fmu, as {target.stem + '.fmu'!r}")
-    if not isinstance(binary, bool):
-        raise ModelError(f"binary is {binary!r}: give True or False")
+    yes_or_no(binary, "binary", ModelError)
+    if compiler is not None and not (isinstance(compiler, str) and compiler.strip()):
+        raise ModelError(f"compiler is {compiler!r:.80}: give a C compiler as on a command line, such as 'gcc', or None")
     checked_axis(axis)
     plant, name = as_model(model), c_name(target.stem)
     sources = {

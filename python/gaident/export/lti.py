@@ -19,8 +19,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gaident.checks import above_zero
-from gaident.data.signals.arrays import LONGEST, SHORTEST
+from gaident.checks import time_of_sample
 from gaident.errors import ModelError
 from gaident.models.effects_linear import LINEAR, Transfer
 from gaident.models.model import Model
@@ -78,11 +77,7 @@ def _chain(model: Model) -> Transfer:
 
 
 def _checked_step(model: Model, dt: float, pade: int | None) -> float:
-
-    remedy = f"give the sample time in s, from {SHORTEST:g} to {LONGEST:g}"
-    step = above_zero(dt, "dt", ModelError, remedy)
-    if not SHORTEST <= step <= LONGEST:
-        raise ModelError(f"dt is {step:g}: {remedy}")
+    step = time_of_sample(dt, ModelError)
     if pade is not None:
         raise ModelError(f"pade is {pade!r}: sampled, the delay is exact; leave pade out, or dt for a continuous system")
     if model.p == 0:

@@ -43,7 +43,11 @@ def outcomes(task: FleetTask, jobs: Iterable[Job], executor: object, workers: in
 
 def _by_map(work: Work, jobs: Iterator[Job], mapped: Callable[..., Iterable[Outcome]]) -> Generator[Outcome, None, None]:
     while window := list(islice(jobs, POLICY.tasks_under_way)):
-        made = mapped(work, window)
+        try:
+            made = mapped(work, window)
+        except Exception as error:
+            told = f"executor raises {type(error).__name__} ({error}): give a function like map, or an Executor"
+            raise SettingsError(f"{told}, and call again, what is done is kept") from error
         for outcome in made if isinstance(made, Iterable) else [made]:
             if not isinstance(outcome, Outcome):
                 raise SettingsError(f"executor gives {outcome!r:.80}: give a function like map, or an Executor")

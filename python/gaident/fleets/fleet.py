@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from gaident.axis import checked_axis
-from gaident.checks import above_zero, checked_path, known_keys, one_of, yes_or_no
+from gaident.checks import checked_path, known_keys, one_of, size_of_drive, yes_or_no
 from gaident.control.controller import Controller, checked_controller
 from gaident.drive.drive_file import Drive, read_drive_file, unfilled_of
 from gaident.errors import SettingsError
@@ -22,6 +22,7 @@ from gaident.fleets.engine import outcomes
 from gaident.fleets.index import Index, opened, result_path
 from gaident.fleets.names import Names, named_logs, names_of
 from gaident.fleets.task import METHODS, FleetTask, Job, Outcome, content_of, shown
+from gaident.identification.arguments import check_numbers
 
 __all__ = ["Fleet", "fleet", "kept_fleet"]
 
@@ -30,7 +31,6 @@ READING = (
     *("inductance", "back_emf_constant", "screw", "reference_speed", "velocity_cutoff_hz", "decimate", "resample", "gear_ratio"),
     *("load_side", "torque_is", "torque_log", "shift", "delimiter", "decimal", "skip", "encoding"),
 )
-MOST_WORKERS = 1024  # no decision: what an argument may be
 
 ProgressCallback = Callable[[float, str], None]
 
@@ -202,12 +202,8 @@ def fleet(
     began = time.perf_counter()
     task = _task(controller, axis, drive, read, method, quick, noise, pitch, temperature, seed)
     yes_or_no(resume, "resume", SettingsError)
-    if progress is not None and not callable(progress):
-        raise SettingsError(f"progress is {progress!r:.80}: give a function of (fraction, message), or None")
+    check_numbers(1, seed, workers, progress)
     folder, named = checked_path(out, "out", SettingsError), names_of(names)
-    whole = isinstance(workers, int) and not isinstance(workers, bool) and 1 <= workers <= MOST_WORKERS
-    if workers is not None and not whole:
-        raise SettingsError(f"workers is {workers!r}: give a whole number from 1 to {MOST_WORKERS}, or None")
     if folder.exists() and not folder.is_dir():
         raise SettingsError(f"out is {os.fspath(out)!r}: this is a file; name a folder")
     with opened(folder) as index:
@@ -249,16 +245,14 @@ def _task(
     """The settings, checked as far as they can be without a log."""
     one_of(method, "method", METHODS, SettingsError)
     yes_or_no(quick, "quick", SettingsError)
-    if isinstance(seed, bool) or not isinstance(seed, int) or seed < 0:
-        raise SettingsError(f"seed is {seed!r}: give a whole number from 0 on")
     if temperature is not None and not isinstance(temperature, str):
         raise SettingsError(f"temperature is {temperature!r:.80}: give the name of the column with the temperature, or None")
     if temperature == "":
         raise SettingsError("temperature is '': give the name of the column with the temperature, or None")
     if noise is not None:
-        noise = above_zero(noise, "noise", SettingsError, "give its standard deviation in rad/s, above 0, or None")
+        noise = size_of_drive(noise, "noise", SettingsError, "give its standard deviation in rad/s, above 0, or None")
     if pitch is not None:
-        pitch = above_zero(pitch, "pitch", SettingsError, "give the length with which cogging returns in m, above 0, or None")
+        pitch = size_of_drive(pitch, "pitch", SettingsError, "give the length with which cogging returns in m, above 0, or None")
     given = None if drive is None else drive if isinstance(drive, Drive) else _drive(checked_path(drive, "drive", SettingsError))
     if given is not None and (controller is not None or read is not None):
         raise SettingsError("drive is given beside controller or read: the drive file says both; leave these out")

@@ -5,7 +5,7 @@ from __future__ import annotations
 import glob
 import os
 import re
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from datetime import datetime, timezone
 from pathlib import PurePath
 from urllib.parse import quote
@@ -35,7 +35,7 @@ def _paths_of(logs: object) -> Iterator[str]:
     if isinstance(logs, (str, os.PathLike)):
         yield from _fitting(checked_path(logs, "logs", SettingsError).as_posix())
         return
-    if not isinstance(logs, Iterable):
+    if not isinstance(logs, Iterable) or isinstance(logs, Mapping | bytes):
         raise SettingsError(f"logs is {logs!r:.80}: give a pattern such as 'logs/**/*.csv', or a list of paths")
     for log in logs:
         yield from _fitting(checked_path(log, "logs", SettingsError).as_posix())

@@ -268,6 +268,8 @@ def _model_covariance(model: Model, theta: Vector, covariance: Vector, dt: float
 
 
 def _source(rec: Record, controller: PI | None) -> Vector:
+    if not isinstance(rec, Record):
+        raise RecordError(f"rec is {type(rec).__name__}: give a gaident.Record")
     torque = None if rec.torque is None else held_torque(rec)
     source, name = (torque, "torque") if controller is None else (rec.command, "command")
     if source is None:

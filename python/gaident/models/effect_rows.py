@@ -1,4 +1,4 @@
-"""The rows of the table of effects, and the table as it prints.
+"""The rows of the table of effects, what they allow, and the table as it prints.
 
 A shaft effect may act at either side of an elastic shaft.
 What acts at the load has a key of its own, "coulomb_friction@load": the core's name for it, and what fits, searches and exports
@@ -7,14 +7,20 @@ tell effects apart by.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from html import escape
 from typing import Any, NamedTuple
 
 from gaident.axis import Text
+from gaident.checks import one_of, real_number
+from gaident.errors import ModelError
 from gaident.models.own_effects import Parameter
 
-__all__ = ["AT_LOAD", "SHAFT", "SIDES", "Row", "Table", "effect_and_side", "end_words", "key_of"]
+__all__ = [
+    *("AT_LOAD", "SHAFT", "SIDES", "Row", "Table", "checked_side", "checked_value"),
+    *("effect_and_side", "end_words", "key_of"),
+]
 
 SHAFT = "shaft"
 """The place of effects that add a torque."""
@@ -133,3 +139,27 @@ class Table(tuple[Row, ...]):
         head = "".join(f"<th {left}>{title}</th>" for title in ("effect", "place", "parameters", "meaning"))
         body = "".join("<tr>" + "".join(f"<td {left}>{escape(cell)}</td>" for cell in row) + "</tr>" for row in rows)
         return f"<table><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>"
+
+
+def checked_side(row: Row, side: object) -> str:
+    """The side; "" of an effect that has none."""
+    one_of(side, f"side of {row.name}", SIDES, ModelError)
+    if side in row.sides:
+        return str(side)
+    if side == SIDES[1]:
+        raise ModelError(f"side of {row.name} is {side!r}: it is in the {row.place} and has no other side; leave side out")
+    return SIDES[0] if row.sides else ""
+
+
+def checked_value(row: Row, parameter: Parameter, value: object) -> float:
+    """The value of a parameter, within its bounds; raises ModelError."""
+    unit = "without unit" if parameter.unit == "1" else f"in {parameter.unit}"
+    bounds = f" {parameter.bounds}" if parameter.bounds else ""
+    what = f"{parameter.name} of {row.name}"
+    if parameter.neutral == math.inf and isinstance(value, float) and value == math.inf:
+        return value
+    number = real_number(value, what, ModelError, f"give one finite number{bounds} {unit}")
+    low = number <= parameter.lowest if parameter.above_lowest else number < parameter.lowest
+    if low or number > parameter.highest:
+        raise ModelError(f"{what} is {number:g}: give a number{bounds} {unit}")
+    return number

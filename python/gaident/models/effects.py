@@ -15,9 +15,9 @@ from typing import Any
 
 from gaident import _core
 from gaident.axis import TURN, Text, say, unit
-from gaident.checks import known_keys, one_of, real_number
+from gaident.checks import known_keys, one_of
 from gaident.errors import ModelError
-from gaident.models.effect_rows import SIDES, Row, Table
+from gaident.models.effect_rows import SIDES, Row, Table, checked_side, checked_value
 from gaident.models.own_effects import OWN, PLACES, Function, Own, Parameter, Signals, check_kinds, checked
 
 __all__ = ["Effect", "Parameter", "Row", "Signals", "Table", "register", "table", "unregister"]
@@ -197,8 +197,8 @@ def unregister(name: str) -> None:
     >>> row = ga.effects.register("push", [parameter], meaning="a constant push", torque=push)
     >>> ga.effects.unregister("push")
     """
-    if name not in OWN:
-        raise ModelError(f"{name!r} is no effect of your own: those are {', '.join(OWN) or 'none'}; built-in ones stay")
+    if not isinstance(name, str) or name not in OWN:
+        raise ModelError(f"{name!r:.80} is no effect of your own: those are {', '.join(OWN) or 'none'}; built-in ones stay")
     del OWN[name]
     _forget()
 
@@ -254,15 +254,15 @@ class Effect:
                 "gaident.diagnose find them"
             )
         names = [p.name for p in row.parameters]
-        given = known_keys(dict(self.parameters), f"effect {self.name}", names, names, ModelError)
-        values = {p.name: _value(row, p, given[p.name]) for p in row.parameters}
+        given = known_keys(self.parameters, f"effect {self.name}", names, names, ModelError)
+        values = {p.name: checked_value(row, p, given[p.name]) for p in row.parameters}
         if row.relation:
             broken = _core.broken_relation(self.name, list(values.values()))
             if broken:
                 shown = ", ".join(f"{k} {v:g}" for k, v in values.items())
                 raise ModelError(f"effect {self.name} has {shown}: {broken}")
         object.__setattr__(self, "parameters", MappingProxyType(values))
-        object.__setattr__(self, "side", _checked_side(row, self.side))
+        object.__setattr__(self, "side", checked_side(row, self.side))
         object.__setattr__(self, "own", row.own)
 
     @property
@@ -341,14 +341,18 @@ def _unknown(name: object) -> str:
     return f"{name!r} is an effect of your own that is not registered here: call gaident.effects.register({name!r}, ...) first"
 
 
-def _checked_side(row: Row, side: object) -> str:
-    """The side; "" of an effect that has none."""
-    one_of(side, f"side of {row.name}", SIDES, ModelError)
-    if side in row.sides:
-        return str(side)
-    if side == SIDES[1]:
-        raise ModelError(f"side of {row.name} is {side!r}: it is in the {row.place} and has no other side; leave side out")
-    return SIDES[0] if row.sides else ""
+def without(effects: Sequence[Effect], name: object, side: object) -> tuple[Effect, ...]:
+    """The effects but for those of this name, at this side where one is given; raises ModelError where there is none."""
+    if not isinstance(name, str):
+        raise ModelError(f"name is {name!r:.80}: give the name of an effect of the model")
+    if side is not None and not isinstance(side, str):
+        raise ModelError(f"side is {side!r:.80}: give 'motor' or 'load', or None for both")
+    rest = tuple(effect for effect in effects if effect.name != name or side not in (None, effect.side))
+    if len(rest) == len(effects):
+        names = ", ".join(e.name + " at the load" * e.at_load for e in effects) or "none"
+        there = "" if side is None else f" with side={side!r}"
+        raise ModelError(f"the model has no effect {name!r}{there}: its effects are {names}")
+    return rest
 
 
 def ordered(effects: Iterable[Effect]) -> tuple[Effect, ...]:
@@ -385,16 +389,3 @@ def checked_effects(effects: Iterable[Effect], p: int, q: int) -> tuple[Effect, 
         if in_series is not None:
             raise ModelError(f"{what} and {in_series} cannot be simulated together: take one of them out with without_effect")
     return found
-
-
-def _value(row: Row, parameter: Parameter, value: object) -> float:
-    unit = "without unit" if parameter.unit == "1" else f"in {parameter.unit}"
-    bounds = f" {parameter.bounds}" if parameter.bounds else ""
-    what = f"{parameter.name} of {row.name}"
-    if parameter.neutral == math.inf and isinstance(value, float) and value == math.inf:
-        return value
-    number = real_number(value, what, ModelError, f"give one finite number{bounds} {unit}")
-    low = number <= parameter.lowest if parameter.above_lowest else number < parameter.lowest
-    if low or number > parameter.highest:
-        raise ModelError(f"{what} is {number:g}: give a number{bounds} {unit}")
-    return number

@@ -141,7 +141,11 @@ def model_from_factor_parameters(values: ArrayLike, structure: FactorCounts) -> 
     >>> ga.model_from_factor_parameters(values, FactorCounts.of(model))
     Model(gain=500.0, poles=[-5.0], zeros=[])
     """
-    x = np.asarray(values, dtype=np.float64)
+    structure = _counts(structure)
+    try:
+        x = np.asarray(values, dtype=np.float64)
+    except (TypeError, ValueError, OverflowError):
+        raise ModelError(f"values is {values!r:.80}: give {structure.size} numbers, as factor_parameters does") from None
     if x.shape != (structure.size,):
         raise ModelError(f"values has the shape {x.shape}: {structure} takes {structure.size} numbers")
     if not np.all(np.isfinite(x)):
@@ -151,6 +155,15 @@ def model_from_factor_parameters(values: ArrayLike, structure: FactorCounts) -> 
     poles = _roots(x[1:poles_end], structure.real_poles)
     zeros = _roots(x[poles_end:], structure.real_zeros)
     return Model(float(x[0]), poles, zeros)
+
+
+def _counts(structure: object) -> FactorCounts:
+    """How many roots of each kind, checked; raises ModelError."""
+    numbers = structure if isinstance(structure, tuple) else ()
+    whole = all(isinstance(n, int) and not isinstance(n, bool) and n >= 0 for n in numbers)
+    if len(numbers) != len(FactorCounts._fields) or not whole:
+        raise ModelError(f"structure is {structure!r:.80}: give gaident.models.FactorCounts, four whole numbers from 0 on")
+    return FactorCounts(*numbers)
 
 
 def model_numbers(model: Model) -> NDArray[np.float64]:

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from gaident.axis import Text, say, unit_text
-from gaident.checks import known_keys, one_of, real_number
+from gaident.checks import known_keys, one_of, real_number, yes_or_no
 from gaident.errors import ModelError
 from gaident.models import two_mass
 from gaident.models.factors import FactorCounts
@@ -180,6 +180,7 @@ class TwoMass:
             For any other structure, and where no such mechanism exists.
         """
         _require(model, 1, 2, "two-mass")
+        yes_or_no(free_shaft_damping, "free_shaft_damping", ModelError)
         found = _two_masses(model, None)
         if found is None:
             raise ModelError("zeros has a root at 0: no stiffness between two masses gives that; use a one-mass model")
@@ -320,6 +321,8 @@ def _named(v: Vector, inconsistency: float, std: dict[str, float], damped: TwoMa
 
 
 def _require(model: Model, p: int, q: int, name: str) -> None:
+    if not isinstance(model, Model):
+        raise ModelError(f"model is a {type(model).__name__}: give a gaident.Model")
     if (model.p, model.q) != (p, q):
         raise ModelError(
             f"the model has p = {model.p}, q = {model.q}, but a {name} mechanism has p = {p}, "

@@ -17,7 +17,7 @@ from gaident.control import core
 from gaident.control.pi import PI, checked_pi
 from gaident.errors import ModelError
 from gaident.models.discrete import Discrete, require_strictly_proper
-from gaident.models.effects import Effect, checked_effects
+from gaident.models.effects import Effect, checked_effects, without
 from gaident.models.effects_linear import LINEAR, Transfer, frequencies, response_of
 from gaident.models.roots import Mode, canonical_roots, modes_of, roots_of, text_of
 from gaident.providers import provided
@@ -140,12 +140,7 @@ class Model:
         ModelError
             Where the model has none of that name there.
         """
-        rest = tuple(effect for effect in self.effects if effect.name != name or side not in (None, effect.side))
-        if len(rest) == len(self.effects):
-            names = ", ".join(e.name + " at the load" * (e.side == "load") for e in self.effects) or "none"
-            there = "" if side is None else f" with side={side!r}"
-            raise ModelError(f"the model has no effect {name!r}{there}: its effects are {names}")
-        return self._with(rest)
+        return self._with(without(self.effects, name, side))
 
     @property
     def linear(self) -> Model:

@@ -199,9 +199,9 @@ def checked(own: Own) -> Own:
     for p in own.parameters:
         if not isinstance(p, Parameter):
             raise ModelError(f"a parameter of {own.name} is {p!r}: give gaident.effects.Parameter(name, unit, lowest=, highest=)")
+        _check_parameter(own.name, p)
     names = [p.name for p in own.parameters]
     for p in own.parameters:
-        _check_parameter(own.name, p)
         if names.count(p.name) > 1:
             raise ModelError(f"{own.name} has two parameters {p.name!r}: give each a name of its own")
     if all(math.isnan(p.neutral) for p in own.parameters):
@@ -216,6 +216,13 @@ def _check_parameter(effect: str, p: Parameter) -> None:
         raise ModelError(f"a parameter of {effect} is named {p.name!r}: give letters, digits and _, as of a variable, not side")
     if not isinstance(p.unit, str) or not p.unit:
         raise ModelError(f'the unit of {what} is {p.unit!r}: give its SI unit, "1" for none')
+    for name, value in (("neutral", p.neutral), ("lowest", p.lowest), ("highest", p.highest)):
+        if not _is_number(value):
+            raise ModelError(f"{name} of {what} is {value!r:.80}: give one number")
+    for name, flag in (("above_lowest", p.above_lowest), ("logarithmic", p.logarithmic)):
+        yes_or_no(flag, f"{name} of {what}", ModelError)
+    if not isinstance(p.starts, Sequence) or isinstance(p.starts, str | bytes) or not all(map(_is_number, p.starts)):
+        raise ModelError(f"starts of {what} is {p.starts!r:.80}: give a tuple of numbers, () for some between the bounds")
     if not (math.isfinite(p.lowest) and math.isfinite(p.highest) and p.lowest < p.highest):
         raise ModelError(
             f"{what} is bound to {p.lowest:g} .. {p.highest:g}: give lowest < highest, both finite: a diagnosis looks there"
@@ -226,6 +233,17 @@ def _check_parameter(effect: str, p: Parameter) -> None:
     for name, value in [*inside, *(("starts", s) for s in p.starts)]:
         if not p.lowest <= value <= p.highest:
             raise ModelError(f"{name} of {what} is {value:g}: give it within its bounds, {p.lowest:g} .. {p.highest:g}")
+
+
+def _is_number(value: object) -> bool:
+    """Whether a float64 takes it, infinity and nan too; a bool is none."""
+    if isinstance(value, bool) or not isinstance(value, int | float | np.integer | np.floating):
+        return False
+    try:
+        float(value)
+    except OverflowError:
+        return False
+    return True
 
 
 def _check_function(own: Own) -> None:

@@ -7,7 +7,7 @@ import numpy as np
 from gaident.arguments import arg
 from gaident.axis import TURN, Text, joined, say
 from gaident.axis import called as name_in_words
-from gaident.checks import real_number
+from gaident.checks import size_of_drive
 from gaident.diagnosis.library.cause import Cause
 from gaident.diagnosis.library.terms import LIBRARY
 from gaident.errors import SettingsError
@@ -137,10 +137,7 @@ def _notes(result: Diagnosis, left: list[Text]) -> list[Text]:
 
 def _speed_of(result: Diagnosis, speed: float | None) -> float:
     if speed is not None:
-        highest = real_number(speed, "speed", SettingsError, "give the highest speed of the table, > 0")
-        if highest <= 0.0:
-            raise SettingsError(f"speed is {highest:g}: give the highest speed of the table, > 0")
-        return highest
+        return size_of_drive(speed, "speed", SettingsError, "give the highest speed of the table, > 0")
     if not result.records:
         raise SettingsError(f"the highest speed is not known: a loaded result has no records; give {arg('speed')}")
     return max(float(np.max(np.abs(r.velocity))) for r in result.records) or 1.0

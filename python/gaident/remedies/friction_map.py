@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gaident.axis import checked_axis, said, say, unit
-from gaident.checks import real_number
+from gaident.checks import size_of_drive
 from gaident.data.record import Record
 from gaident.errors import RecordError, SettingsError
 from gaident.estimation.regression.inverse_dynamics import inverse_dynamics
@@ -190,9 +190,7 @@ def friction_map(
     if inertia is None:
         mass = inverse_dynamics(list(given), axis=axis).parameters["inertia"].value
     else:
-        mass = real_number(inertia, "inertia", SettingsError, "give a number > 0")
-        if mass <= 0.0:
-            raise SettingsError(f"inertia is {mass:g}: give a number > 0, or None")
+        mass = size_of_drive(inertia, "inertia", SettingsError, "give a number > 0, or None")
     motions = [motion_of(rec, cutoff_of(rec, ORDER), ORDER) for rec in given]
     speeds = [np.abs(m.velocity[~m.still]) for m in motions]
     for rec, moving in zip(given, speeds, strict=True):

@@ -11,7 +11,7 @@ import numpy as np
 
 from gaident.arguments import arg
 from gaident.axis import Text, say
-from gaident.checks import real_number
+from gaident.checks import above_zero, size_of_drive, time_of_sample, yes_or_no
 from gaident.control.cascade import Cascade, cascade_of
 from gaident.control.controller import Controller, checked_controller
 from gaident.control.differencing import older
@@ -124,8 +124,7 @@ def retune(
     given = _controller_of(result, controller)
     period = _period_of(result, given, dt)
     asked = _asked(result, given, phase_margin, gain_margin, torque_limit, torque_noise, step)
-    if not isinstance(filters, bool):
-        raise SettingsError(f"filters is {filters!r}: give True or False")
+    yes_or_no(filters, "filters", SettingsError)
     if isinstance(seed, bool) or not isinstance(seed, int) or seed < 0:
         raise SettingsError(f"seed is {seed!r}: give a whole number >= 0")
     age = age_of(result, given)
@@ -333,9 +332,7 @@ def _controller_of(result: object, controller: Controller | None) -> Controller:
 
 def _period_of(result: Identification | Diagnosis, given: Controller, dt: float | None) -> float:
     if dt is not None:
-        period = real_number(dt, "dt", SettingsError, "give the sample time of the controller in s, > 0")
-        if period <= 0.0:
-            raise SettingsError(f"dt is {period:g}: give the sample time of the controller in s, > 0")
+        period = time_of_sample(dt, SettingsError, "the sample time of the controller")
         if given.clock is not None and not math.isclose(given.clock, period, rel_tol=1e-9):
             raise SettingsError(f"dt is {period:g} and the controller's period {given.clock:g}: give one of them, or both alike")
         return period
@@ -360,14 +357,12 @@ def _asked(
     own = None if np.isinf(given.limits[0]) else given.limits[0]
     numbers: dict[str, Any] = {}
     for name, value, highest, unit in (("phase_margin", phase, UPPER, "deg"), ("gain_margin", gain, DECIBELS, "dB")):
-        numbers[name] = real_number(value, name, SettingsError, f"give a number in {unit}, > 0")
+        numbers[name] = above_zero(value, name, SettingsError, f"give a number in {unit}, > 0")
         if not 0.0 < numbers[name] < highest:
             raise SettingsError(f"{name} is {numbers[name]:g}: give a number in {unit}, above 0 and below {highest:g}")
     for name, more in (("torque_limit", torque), ("torque_noise", torque_noise), ("step", step)):
         if more is not None:
-            numbers[name] = real_number(more, name, SettingsError, "give a number > 0")
-            if numbers[name] <= 0.0:
-                raise SettingsError(f"{name} is {numbers[name]:g}: give a number > 0, or leave it out")
+            numbers[name] = size_of_drive(more, name, SettingsError, "give a number > 0, or leave it out")
     return Asked(
         numbers["phase_margin"],
         numbers["gain_margin"],

@@ -54,7 +54,8 @@ class Asked:
         factor: float = 10.0 ** (self.gain_margin / 20.0)
         # no decision: a formula: the chord of a circle
         of_phase = 0.5 / math.sin(math.radians(0.5 * self.phase_margin))
-        return float(max(POLICY.most_sensitivity, of_phase, factor / (factor - 1.0)))
+        of_gain = factor / (factor - 1.0) if factor > 1.0 else math.inf  # 1 is also that of a margin too small for a float64
+        return float(max(POLICY.most_sensitivity, of_phase, of_gain))
 
     def roomier(self) -> Asked:
         """With the margins that the search keeps."""

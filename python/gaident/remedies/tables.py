@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from gaident.axis import called, linear_sentences, said, say, unit
-from gaident.checks import checked_path
+from gaident.checks import LARGEST, checked_path
 from gaident.errors import SettingsError
 from gaident.export.c_source import c_name
 from gaident.files import write_whole
@@ -29,6 +29,22 @@ __all__ = ["FeedforwardTables", "Wave"]
 Vector = NDArray[np.float64]
 
 SHOWN = 4  # no decision: printed: speeds of the summary
+
+
+def _of_motion(values: ArrayLike, name: str) -> Vector:
+    """Numbers of a motion; raises SettingsError naming the argument."""
+    remedy = "give real numbers, one or an array of them"
+    try:
+        array = np.asarray(values)
+        if array.dtype.kind not in "iuf":  # no decision: a format: whole numbers and others, of numpy
+            raise TypeError(f"dtype {array.dtype}")
+    except (TypeError, ValueError) as reason:
+        raise SettingsError(f"{name} is {values!r:.60} ({reason}): {remedy}") from None
+    array = array.astype(np.float64)
+    far = array[~(np.abs(array) <= LARGEST)]  # not a number, too
+    if far.size:
+        raise SettingsError(f"{name} has {far[0]:g}, which no drive reaches ({LARGEST:g} at most): {remedy}")
+    return array
 
 
 @dataclass(frozen=True)
@@ -120,8 +136,18 @@ class FeedforwardTables:
         -------
         ndarray
             Torque [N m], of the shape that the three have together.
+
+        Raises
+        ------
+        SettingsError
+            For what is no number of a drive's motion, and shapes that do not go together.
         """
-        w, x, a = (np.asarray(value, dtype=np.float64) for value in (velocity, angle, acceleration))
+        w, x, a = (_of_motion(v, n) for v, n in ((velocity, "velocity"), (angle, "angle"), (acceleration, "acceleration")))
+        try:
+            np.broadcast_shapes(w.shape, x.shape, a.shape)
+        except ValueError:
+            told = f"velocity, angle and acceleration have the shapes {w.shape}, {x.shape} and {a.shape}"
+            raise SettingsError(f"{told}: give one number for all, or as many of each") from None
         middle = len(self.velocity) // 2
         speeds = np.concatenate([self.velocity[:middle], [0.0], self.velocity[middle:]])
         levels = np.concatenate([self.friction[:middle], [0.0], self.friction[middle:]])
@@ -165,8 +191,8 @@ class FeedforwardTables:
         SettingsError
             For a name that C does not take.
         """
-        if name is not None and not re.fullmatch(r"[A-Za-z_][A-Za-z0-9_]*", name):
-            raise SettingsError(f"name is {name!r}: give what C takes as a name, letters, digits and _")
+        if name is not None and not (isinstance(name, str) and re.fullmatch(r"[A-Za-z_][A-Za-z0-9_]*", name)):
+            raise SettingsError(f"name is {name!r:.80}: give what C takes as a name, letters, digits and _")
         text = c_tables(self, name or c_name("feedforward" if path is None else checked_path(path).stem))
         if path is not None:
             write_whole(Path(path), text.encode())

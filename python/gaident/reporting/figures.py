@@ -6,12 +6,13 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from gaident.axis import checked_axis, said
+from gaident.checks import yes_or_no
 from gaident.control.controller import Controller
 from gaident.control.pi import bare_pi
 from gaident.data.frequency.response import FrequencyResponse
 from gaident.data.record import Record
 from gaident.diagnosis.explain.evidence import velocity_curve
-from gaident.errors import GaidentError
+from gaident.errors import GaidentError, SettingsError
 from gaident.identification.response.averaged import response_of, responses_of
 from gaident.models.model import Model
 from gaident.reporting.runs import run_of
@@ -59,6 +60,7 @@ def _title(dia: Diagnosis, rec: Record, records: Sequence[Record]) -> str:
 
 def plot_bode(model: Model, controller: Controller | None, records: Sequence[Record], hz: bool, axis: str) -> Figure:
     """A model against the frequency response of the longest record, or alone; see `Identification.plot_bode`."""
+    yes_or_no(hz, "hz", SettingsError)
     if not records:
         return plots.plot_bode(model, axis=axis, hz=hz)
     return response_plots.plot_response(response_of(max(records, key=len), model, bare_pi(controller)), hz, axis)
@@ -72,5 +74,6 @@ def plot_frequency_response(
 ) -> Figure:
     """Measured frequency responses, all in one diagram, and the model that was found from them."""
     checked_axis(axis)
+    yes_or_no(hz, "hz", SettingsError)
     name = given[0].name if len(given) == 1 else ""
     return response_plots.plot_response(responses_of(given, model), hz, axis, name)

@@ -21,7 +21,7 @@ from gaident.results.fitness import IN_SAMPLE, Comparison, Fitness
 from gaident.results.identification import Identification
 from gaident.results.inverse_dynamics import InverseDynamics
 from gaident.results.relevance import Relevance
-from gaident.results.saved import rows_of, undamaged
+from gaident.results.saved import given_record, rows_of, undamaged
 from gaident.results.what_if import WhatIf
 
 if TYPE_CHECKING:
@@ -208,7 +208,7 @@ class Diagnosis(WhatIf):
         RecordError
             Where no torque is logged and this controller makes none of what is.
         """
-        rec = as_read(rec, self.controller, self.log_shifts)
+        rec = as_read(given_record(rec), self.controller, self.log_shifts)
         return rec if self.controller is None or self.controller.one_equation else driven_by(rec, self.controller)
 
     def summary(self, axis: str | None = None, units: Mapping[str, str | float] | None = None) -> str:

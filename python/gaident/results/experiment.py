@@ -11,12 +11,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gaident.axis import linear_sentences, restored
-from gaident.checks import real_number
+from gaident.checks import LARGEST, real_number
 from gaident.control.pi import PI
 from gaident.data.record import Record
-from gaident.data.signals.arrays import LARGEST
 from gaident.errors import SettingsError
 from gaident.providers import provided
+from gaident.results.saved import undamaged
 
 __all__ = ["Limits", "Proposal", "swept"]
 
@@ -150,13 +150,14 @@ class Proposal:
 
     @classmethod
     def from_dict(cls, data: Mapping[str, Any]) -> Proposal:
-        """Return the proposal of what `to_dict` gave."""
-        command = np.asarray(data["command"], dtype=np.float64)
-        reason = restored(str(data["reason"]), data.get("linear_axis", {}))
-        place = data.get("position_command")
-        path = None if place is None else np.asarray(place, dtype=np.float64)
-        alike = {name: tuple(others) for name, others in data.get("alike", {}).items()}
-        return cls(command, float(data["dt"]), tuple(data["separates"]), float(data["margin"]), reason, path, alike)
+        """Return the proposal of what `to_dict` gave; raises GaidentError where the data are something else."""
+        with undamaged("proposal"):
+            command = np.asarray(data["command"], dtype=np.float64)
+            reason = restored(str(data["reason"]), data.get("linear_axis", {}))
+            place = data.get("position_command")
+            path = None if place is None else np.asarray(place, dtype=np.float64)
+            alike = {name: tuple(others) for name, others in data.get("alike", {}).items()}
+            return cls(command, float(data["dt"]), tuple(data["separates"]), float(data["margin"]), reason, path, alike)
 
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, Proposal):

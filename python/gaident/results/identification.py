@@ -25,7 +25,7 @@ from gaident.models.starts import starts_moving
 from gaident.providers import picture, provided
 from gaident.results.adequacy import Adequacy
 from gaident.results.estimate import Estimate
-from gaident.results.saved import SavedResult, rows_of, undamaged
+from gaident.results.saved import SavedResult, given_record, rows_of, undamaged
 from gaident.results.settings import Settings
 from gaident.results.structures import Rival, Structure, TrialOutcome
 
@@ -188,7 +188,7 @@ class Identification(SavedResult):
         Record
             The same, or one with another velocity and torque.
         """
-        if rec.digest in self.digests:
+        if given_record(rec).digest in self.digests:
             return rec
         if bare_pi(self.controller) is not None:
             return without_age(rec)
@@ -202,8 +202,6 @@ class Identification(SavedResult):
         Another one that does not start at rest gets its initial state estimated.
         Raises GaidentError where that is impossible, because the controller has limits.
         """
-        if not isinstance(rec, Record):
-            raise GaidentError(f"rec is {type(rec).__name__}: give a gaident.Record")
         rec = self.as_used(rec)
         state: Sequence[float] | NDArray[np.float64] | None = self.initial_states.get(rec.digest)
         unseen = rec.digest not in self.digests and self.settings.initial_state != "rest"

@@ -105,7 +105,7 @@ class InverseDynamics:
 
         Raises RecordError where a record has no torque or does not move, SettingsError as `torque` does.
         """
-        return float(provided("regression_error")(self, [records] if isinstance(records, Record) else list(records)))
+        return float(provided("regression_error")(self, [records] if isinstance(records, Record) else records))
 
     def summary(self) -> str:
         """Return what was found and what it is worth; plain text, no line break at the end."""

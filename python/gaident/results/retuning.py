@@ -101,9 +101,10 @@ class LoopFigures:
 
     @classmethod
     def from_dict(cls, data: Mapping[str, Any]) -> LoopFigures:
-        """Return the figures of what `dataclasses.asdict` gave."""
-        found: dict[str, Any] = {f.name: None if data[f.name] is None else Spread(**data[f.name]) for f in fields(cls)}
-        return cls(**found)
+        """Return the figures of what `dataclasses.asdict` gave; raises GaidentError where the data are something else."""
+        with undamaged("figures of a loop"):
+            found: dict[str, Any] = {f.name: None if data[f.name] is None else Spread(**data[f.name]) for f in fields(cls)}
+            return cls(**found)
 
 
 @dataclass(frozen=True)

@@ -13,7 +13,14 @@ from gaident.errors import GaidentError
 from gaident.files import write_whole
 from gaident.results.json_text import json_text
 
-__all__ = ["SavedResult", "rows_of", "undamaged"]
+__all__ = ["SavedResult", "given_record", "rows_of", "undamaged"]
+
+
+def given_record(rec: object) -> Record:
+    """`rec`, where it is a record; raises GaidentError."""
+    if not isinstance(rec, Record):
+        raise GaidentError(f"rec is {type(rec).__name__}: give a gaident.Record")
+    return rec
 
 
 class SavedResult(ABC):

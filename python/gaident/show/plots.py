@@ -10,8 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gaident.axis import unit, velocity_unit, word
+from gaident.checks import yes_or_no
 from gaident.data.record import Record
 from gaident.data.torque_kind import MEASURED
+from gaident.errors import SettingsError
 from gaident.models.model import Model
 from gaident.results.identification import Identification
 from gaident.show.draw import BLACK, BLUE, GREEN, GREY, ORANGE, SKY, VERMILION, chart_figure, headed, line, new_figure, tidy
@@ -124,6 +126,7 @@ def plot_structures(idn: Identification) -> Figure:
 
 def plot_poles_zeros(idn: Identification, hz: bool = False) -> Figure:
     """Poles and zeros in the s-plane [rad/s], or divided by 2 pi [Hz], with bars of +-2 standard deviations."""
+    yes_or_no(hz, "hz", SettingsError)
     return chart_figure(roots_chart(idn, hz), 6.0, 5.0, ["Poles and zeros, bars ±2 std"])
 
 

@@ -9,7 +9,7 @@ A voltage also has the back-EMF of the motor in kV, which no model from torque t
 from __future__ import annotations
 
 from gaident.axis import unit
-from gaident.checks import real_number
+from gaident.checks import size_of_drive
 from gaident.errors import SettingsError
 from gaident.simulators.numbers import JointNumbers
 
@@ -20,11 +20,7 @@ def wpilib(joint: JointNumbers, torque_constant: float | None) -> dict[str, floa
     """See `JointParameters.to_wpilib`."""
     constant, output = 1.0, unit("N m", joint.axis)
     if torque_constant is not None:
-        constant = real_number(
-            torque_constant, "torque_constant", SettingsError, "give the torque constant [N m/A], > 0, or None"
-        )
-        if constant <= 0.0:
-            raise SettingsError(f"torque_constant is {constant:g}: give the torque constant [N m/A], > 0, or None")
-        output = "A"
+        remedy = "give the torque constant [N m/A], > 0, or None"
+        constant, output = size_of_drive(torque_constant, "torque_constant", SettingsError, remedy), "A"
     values = {"kS": joint.friction, "kV": joint.damping, "kA": joint.inertia, "kG": joint.load}
     return {**{name: value / constant for name, value in values.items()}, "unit": output}

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from gaident.arguments import arg
 from gaident.axis import Text, called, joined, say
-from gaident.checks import real_number
+from gaident.checks import size_of_drive
 from gaident.control.controller import Controller
 from gaident.diagnosis.library.terms import LIBRARY
 from gaident.errors import ModelError, SettingsError
@@ -116,10 +116,7 @@ def joint_parameters(
 
 def _speed_of(result: object, speed: float | None) -> float | None:
     if speed is not None:
-        highest = real_number(speed, "speed", SettingsError, "give the highest speed, > 0")
-        if highest <= 0.0:
-            raise SettingsError(f"speed is {highest:g}: give the highest speed, > 0")
-        return highest
+        return size_of_drive(speed, "speed", SettingsError, "give the highest speed, > 0")
     records = result.records if isinstance(result, Diagnosis | Identification) else ()
     return max((float(np.max(np.abs(r.velocity))) for r in records), default=0.0) or None
 

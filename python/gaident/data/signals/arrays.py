@@ -10,15 +10,13 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from gaident.arguments import arg
+from gaident.checks import LARGEST, LONGEST, SHORTEST
 from gaident.errors import RecordError
 
 __all__ = ["MINIMUM_SAMPLES", "channel", "first_not_finite", "positive_number", "sample_time"]
 
 MINIMUM_SAMPLES = 20  # no decision: what an argument may be: a record has so many samples at least
 """Fewer samples identify nothing."""
-
-LARGEST = 1e30  # no decision: what an argument may be: far beyond counters of 64 bits, far below where squares overflow
-SHORTEST, LONGEST = 1e-12, 1e9  # no decision: what an argument may be: sample times [s]
 
 _REFUSED_KINDS = {
     "b": ("boolean", "convert it with .astype(float) if 0 and 1 are really meant"),

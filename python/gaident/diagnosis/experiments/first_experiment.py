@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 
 from gaident.axis import Text, checked_axis, joined, say
 from gaident.checks import above_zero
+from gaident.control.controller import checked_controller
 from gaident.control.filtering import rate_limited
 from gaident.control.pi import PI
 from gaident.data.record import Record
@@ -170,7 +171,10 @@ def candidate_commands(dt: float, limits: Limits, inertia: float | None = None, 
 
 def limits_of(records: Record | Sequence[Record], controller: PI | None = None, axis: str = "rotary") -> Limits:
     """What records show to be allowed, see `Limits.of`."""
-    listed = [records] if isinstance(records, Record) else list(records)
+    listed = [records] if isinstance(records, Record) else records
+    if not isinstance(listed, Sequence) or not all(isinstance(r, Record) for r in listed):
+        raise SettingsError(f"records is {type(records).__name__}: give a gaident.Record or a list of them")
+    checked_controller(controller)
     asked = [rec.velocity if rec.command is None else rec.command for rec in listed]
     travel = max((float(np.ptp(position_of(rec))) for rec in listed), default=0.0)
     torque = max((float(np.abs(torque_of(rec, controller)).max()) for rec in listed), default=0.0)

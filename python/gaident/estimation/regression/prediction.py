@@ -26,6 +26,8 @@ def regression_torque(found: InverseDynamics, record: Record) -> NDArray[np.floa
 
 def regression_error(found: InverseDynamics, records: Sequence[Record]) -> float:
     """See `InverseDynamics.error`."""
+    if not isinstance(records, Sequence) or not records or not all(isinstance(r, Record) for r in records):
+        raise RecordError(f"records is {type(records).__name__}: give a gaident.Record or a list of them, at least one")
     squares = whole = 0.0
     for record in records:
         _fits(found, record)
@@ -41,6 +43,8 @@ def regression_error(found: InverseDynamics, records: Sequence[Record]) -> float
 
 
 def _fits(found: InverseDynamics, record: Record) -> None:
+    if not isinstance(record, Record):
+        raise RecordError(f"record is {type(record).__name__}: give a gaident.Record")
     if not found.cutoff_hz < 0.5 / record.dt:  # no decision: a formula: the Nyquist frequency
         raise SettingsError(
             f"the record has dt={record.dt:g} s, too slow for the filter of {found.cutoff_hz:g} Hz that was used; "
