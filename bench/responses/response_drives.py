@@ -3,7 +3,7 @@
     python bench/responses/response_drives.py [--cases 100] [--seed 1] [--held] [--late] [--peer]
 
 Chains of one, two and three masses in turn, 60 to 200 frequencies from 1 to 450 Hz, standard deviations stated in every second.
-A mass counts as shown where the best chain that is smaller, fitted to the response without noise and without a path, is worse by
+A mass counts as shown where the best chain that is smaller, fitted to the response with a tenth of the noise, is worse by
 more than ten units of BIC, whatever the noise does to them.
 Chance moves the gain D in 2 ln(likelihood) by 2 sqrt(D), of which three are left.
 --held: behind a hold of 1 ms.
@@ -79,14 +79,20 @@ def path_of(rng: np.random.Generator, kind: int, long: bool) -> dict[str, float]
 
 
 def shown_masses(model: ga.Model, f: np.ndarray, dt: float | None, noise: float) -> int:
-    """Masses that the response shows: a smaller chain is worse by more than ten units of BIC at this noise."""
+    """Masses that the response shows: a smaller chain is worse by more than ten units of BIC at this noise.
+
+    How much worse is read off a response with a tenth of the noise, whose own share 2 n is taken out.
+    """
     g = exact(model, f, dt)
-    clean = ga.identify(ga.FrequencyResponse(f, g, noise * np.abs(g), dt=dt), space=None)
+    e = np.random.default_rng(0).standard_normal((2, len(f)))
+    g = g * (1.0 + 0.1 * noise / np.sqrt(2.0) * (e[0] + 1j * e[1]))
+    clear = ga.identify(ga.FrequencyResponse(f, g, 0.1 * noise * np.abs(g), dt=dt))
     largest = 1 + model.q // 2
-    sums = {s.q: s.error_sum for s in clean.structures if s.p == 1}
+    sums = {s.q: s.error_sum for s in clear.structures if s.p == 1}
     for masses in range(1, largest):
         # With noise the sum of a chain is 2 n more.
-        smaller, size = sums.get(2 * (masses - 1), np.inf), 2.0 * len(f)
+        size = 2.0 * len(f)
+        smaller = max(sums.get(2 * (masses - 1), np.inf) - size, 0.0) / 100.0
         gain = size * np.log1p(smaller / size)
         if gain - 6.0 * np.sqrt(gain) - 4.0 * (largest - masses) * np.log(size) < 10.0:
             return masses

@@ -28,7 +28,7 @@ from gaident.control.pi_torque import pi_torque
 from gaident.data.frequency.response import FrequencyResponse
 from gaident.data.record import Record
 from gaident.errors import RecordError
-from gaident.models.discrete import held_response
+from gaident.identification.response.held import held_response
 from gaident.models.held_torque import held_mean
 from gaident.models.model import Model
 from gaident.models.simulate import Run, run

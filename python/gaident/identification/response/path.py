@@ -20,8 +20,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gaident.data.frequency.response import FrequencyResponse
+from gaident.identification.response.held import held_response, held_transfer
 from gaident.identification.response.weighed import Weighed
-from gaident.models.discrete import held_response, held_transfer
 from gaident.models.effects import Effect
 from gaident.models.effects_linear import DELAY, LAG
 from gaident.models.factors import FactorCounts, factor_parameters, model_from_factor_parameters
@@ -33,8 +33,8 @@ Vector = NDArray[np.float64]
 Matrix = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
-GRID = tuple(0.5 + k for k in range(9))  # no decision: a grid: rad, the phase of a path at the highest frequency
-LAGS = (0.5, 0.9)  # no decision: a grid: parts of a path that its lag begins from; the rest is the delay
+GRID = tuple(0.5 + 2.0 * k for k in range(5))  # no decision: a grid: rad, the phase of a path at the highest frequency
+LAGS = (0.5,)  # no decision: a grid: parts of a path that its lag begins from; the rest is the delay
 LEAST = 0.05  # no decision: a grid: rad at the highest frequency, of a delay that begins from nearly nothing
 FRACTION = 1e-2  # no decision: of a solver: the least unit of a factor, in units of the lowest frequency
 EVALUATIONS = 200  # no decision: of a solver
