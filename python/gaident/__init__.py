@@ -41,6 +41,8 @@ provide(
         "diagnosis_html": "gaident.show.report.notebook:diagnosis_html",
         "diagnosis_table": "gaident.export.tables:diagnosis_table",
         "plot_diagnosis": "gaident.reporting.figures:plot_diagnosis",
+        "stability": "gaident.diagnosis.stability:stability",
+        "stability_summary": "gaident.show.wording:stability_summary",
         "run_as_seen": "gaident.estimation.mean_velocity:run_as_seen",
         # InverseDynamics
         "regression_torque": "gaident.estimation.regression.prediction:regression_torque",

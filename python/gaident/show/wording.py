@@ -11,9 +11,20 @@ from gaident.results.diagnosis import Diagnosis
 from gaident.results.estimate import Estimate
 from gaident.results.finding import Finding, where
 from gaident.results.fitness import Fitness
+from gaident.results.what_if import Stability
 
 __all__ = [
-    *("cause_words", "certainty", "controller_lines", "either", "free_run_words", "missing_words", "number", "size_words"),
+    *(
+        "cause_words",
+        "certainty",
+        "controller_lines",
+        "either",
+        "free_run_words",
+        "missing_words",
+        "number",
+        "size_words",
+        "stability_summary",
+    ),
     *("NOT_AS_GIVEN", "SPREAD", "WIDTH", "diverges", "not_as_given", "step_words", "structure_words", "table", "with_std"),
     "words",
 ]
@@ -157,3 +168,8 @@ def missing_words(finding: Finding, dia: Diagnosis, axis: str) -> str:
     kinds = [" ".join(name[:-1]) for name in names]
     first = f"{kinds[0]} {where(finding, dia.model)}".rstrip()
     return f"{names[0][-1]}, {size}; its kind is open ({', '.join((first, *kinds[1:-1]))} or {kinds[-1]})"
+
+
+def stability_summary(found: Stability) -> str:
+    """How often causes are named again: a sentence for each, then a row for each variation."""
+    return "\n".join([*found.sentences, "", *table([("variation", "verdict", "causes"), *found.rows])])

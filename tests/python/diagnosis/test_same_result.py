@@ -115,3 +115,55 @@ def _numbers(x: object) -> list[float]:
     if isinstance(x, list):
         return [v for value in x for v in _numbers(value)]
     return [float(x)] if isinstance(x, int | float) and not isinstance(x, bool) else []
+
+
+@pytest.fixture(scope="module")
+def varied() -> tuple[ga.Diagnosis, Any]:
+    dia = ga.diagnose(recorded(4, LEVELS * 2, torque=True), CONTROLLER)
+    return dia, dia.stability()
+
+
+def test_a_cause_of_the_drive_is_named_in_its_variations(varied: tuple[ga.Diagnosis, Any]) -> None:
+    """Dry friction is in every part of the record; with a torque logged it is looked for in half as many lines, too."""
+    dia, found = varied
+    assert [f.effect for f in dia.causes] == ["coulomb_friction"]
+    whats = [v.what for v in found.variations]
+    assert whats == ["first half", "middle half", "second half", "every second line", "seed 1", "seed 2"]
+    again, of = found.named("coulomb_friction")
+    assert of == 6 and again >= 5
+    assert f"coulomb_friction: named in {again} of 6 variations that could show it" in found.summary()
+    assert all(v.verdict in found.summary() for v in found.variations)
+    with pytest.raises(ga.errors.SettingsError, match="the causes of this diagnosis are coulomb_friction"):
+        found.named("backlash")
+
+
+def test_stability_says_the_same_again_and_of_a_loaded_diagnosis(varied: tuple[ga.Diagnosis, Any]) -> None:
+    dia, found = varied
+    loaded = ga.Diagnosis.from_dict(dia.to_dict())
+    with pytest.raises(ga.GaidentError, match=r"give stability\(records\)"):
+        loaded.stability()
+    said: list[tuple[float, str]] = []
+    assert loaded.stability(dia.records, progress=lambda part, text: said.append((part, text))) == found
+    assert said[0][1].startswith("first half: ") and [part for part, _ in said] == sorted(part for part, _ in said)
+    assert json.loads(json.dumps(found.to_dict()))["causes"] == [["coulomb_friction"]]
+    with pytest.raises(ga.errors.SettingsError, match="progress is 3"):
+        dia.stability(progress=3)  # type: ignore[arg-type]
+
+
+def test_a_cause_of_one_part_alone_is_a_hint() -> None:
+    """Counted by what each variation says, whatever was diagnosed."""
+    from gaident.results.what_if import Stability, Variation
+
+    said = (
+        Variation("first half", "explained", (("backlash",),)),
+        Variation("second half", "adequate"),
+        Variation("middle half", "explained", (("backlash", "compliance"),)),
+        Variation("seed 1", "adequate", hidden=("backlash",)),
+        Variation("seed 2", "", refused="too short"),
+    )
+    found = Stability("explained", (("backlash",),), said)
+    assert found.named("backlash") == (1, 3)
+    assert found.sentences[0] == "Verdict explained in 2 of 4 variations of the records."
+    assert found.sentences[1].startswith("backlash: named in 1 of 3 variations that could show it, in 1 more not told apart")
+    assert found.sentences[1].endswith(": a hint, and no cause to act on.")
+    assert found.others == {}

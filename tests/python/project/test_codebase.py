@@ -48,6 +48,7 @@ ROOMS = [
         "diagnosis/explain",
         "diagnosis/work",
         "diagnosis/diagnose",
+        "diagnosis/stability",
     ),
     "remedies",  # gains, and tables of feedforward, of what was found
     "simulators",  # the same under the names of other simulators
