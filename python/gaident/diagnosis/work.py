@@ -18,7 +18,7 @@ from gaident.diagnosis.controller.driving import Driving
 from gaident.diagnosis.controller.joint_numbers import joint_numbers
 from gaident.diagnosis.experiments.candidates import candidates, loop_notes
 from gaident.diagnosis.experiments.excitation import excitation
-from gaident.diagnosis.explain.alternatives import LOG_SHIFT, alike_here, alternatives_of, impossible_here
+from gaident.diagnosis.explain.alternatives import LOG_SHIFT, alike_here, alternatives_of, impossible_here, integrator_start
 from gaident.diagnosis.explain.bending import bent_by, relevance_of
 from gaident.diagnosis.explain.determined import determined, not_determined
 from gaident.diagnosis.explain.held_out import standing
@@ -378,7 +378,7 @@ class Work:
         shown = attribution.shown_by_the_records(self.found.space, self.final, effect)
         follows = not (self.data.slower and self.driving.in_doubt)
         names = alternatives_of(effect, rivals, sorted(self._equivalent_here(effect)), bool(shown), offset, follows, never)
-        names += [OTHER_GAINS] * (effect in self.gain_doubt.rivals)
+        names += integrator_start(effect, self.data) + [OTHER_GAINS] * (effect in self.gain_doubt.rivals)
         names += [LOG_SHIFT] * (LIBRARY[effect].in_series and not LIBRARY[effect].resonates and self.driving.moved.may_be_early)
         if self.form is not None and self.form.as_good(self.found.space.margin) and effect in in_series(self.final):
             names.append(self.form.finding.effect)

@@ -167,3 +167,15 @@ def test_a_cause_of_one_part_alone_is_a_hint() -> None:
     assert found.sentences[1].startswith("backlash: named in 1 of 3 variations that could show it, in 1 more not told apart")
     assert found.sentences[1].endswith(": a hint, and no cause to act on.")
     assert found.others == {}
+
+
+def test_what_the_integrator_held_when_a_record_began_is_no_load() -> None:
+    """Cut out of a run, without a torque: the integral at its start acts like a constant load, which the drive has not."""
+    whole = recorded(4, LEVELS * 2)
+    dia = ga.diagnose(whole[500:1500], CONTROLLER)
+    found = {f.effect: f for f in dia.causes}
+    assert "coulomb_friction" in found and not found["coulomb_friction"].alternatives
+    assert all("integrator_start" in f.alternatives for name, f in found.items() if name == "load_torque")
+    assert "load_torque" in found
+    logged = ga.diagnose(recorded(4, LEVELS * 2, torque=True)[500:1500], CONTROLLER)
+    assert [f.effect for f in logged.causes] == ["coulomb_friction"]

@@ -11,15 +11,27 @@ from gaident.diagnosis.library.terms import LIBRARY, conditional_classes, level_
 from gaident.diagnosis.selection.offset import Offset
 from gaident.diagnosis.selection.rivals import Replacement
 from gaident.diagnosis.unlogged.other_gains import OTHER_GAINS
+from gaident.estimation.dataset import DataSet
 from gaident.models.effect_rows import SHAFT
+from gaident.models.starts import starts_moving
 from gaident.results.estimate import Estimate
 
-__all__ = ["LOG_SHIFT", "alike_here", "alternatives_of", "impossible_here"]
+__all__ = ["INTEGRATOR_START", "LOG_SHIFT", "alike_here", "alternatives_of", "impossible_here", "integrator_start"]
 
 OF_THE_CONTROLLER = (OTHER_GAINS, "torque_filter")
 """What a controller that is not the drive's may lack, in words of the findings."""
 LOG_SHIFT = "log_shift"
 """A log that wrote the torque whole lines early, in place of what makes a motion late."""
+INTEGRATOR_START = "integrator_start"
+"""What the controller's integrator held when a record began, in place of a constant load."""
+
+
+def integrator_start(effect: str, data: DataSet) -> list[str]:
+    """INTEGRATOR_START in place of a constant torque, where a record begins in motion with an integral that no channel shows."""
+    controller = data.controller
+    if controller is None or controller.gains.ki == 0.0 or data.torque_logged or not LIBRARY[effect].constant:
+        return []
+    return [INTEGRATOR_START] * any(starts_moving(r, controller) for r in data.records)
 
 
 def alike_here(effect: str, excited: Excitation, torque_logged: bool) -> set[str]:
