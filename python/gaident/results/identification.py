@@ -315,7 +315,7 @@ class Identification(SavedResult):
         return html
 
     def to_pandas(self) -> Any:
-        """Return the parameters as a pandas DataFrame: rows (model or mechanics, parameter), columns value, std, unit, ...
+        """Return the parameters as a pandas DataFrame: rows (model, path or mechanics, parameter), columns value, std, unit, ...
 
         Raises ImportError with the way to get pandas.
         """

@@ -104,7 +104,7 @@ class Stability:
             again, of = self.named(names[0])
             possible = [v.says(names) for v in self.variations].count(POSSIBLE)
             more = f", in {possible} more not told apart from others" if possible else ""
-            doubt = "" if 2 * again > of else ": a hint, and no cause to act on"
+            doubt = ": a hint, and no cause to act on" if of and 2 * again <= of else ""
             text.append(f"{' or '.join(names)}: named in {again} of {of} variations that could show it{more}{doubt}.")
         text += [f"{name}: named in {count} of them, and not in the records as they are." for name, count in self.others.items()]
         return tuple(text)

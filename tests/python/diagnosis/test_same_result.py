@@ -167,6 +167,8 @@ def test_a_cause_of_one_part_alone_is_a_hint() -> None:
     assert found.sentences[1].startswith("backlash: named in 1 of 3 variations that could show it, in 1 more not told apart")
     assert found.sentences[1].endswith(": a hint, and no cause to act on.")
     assert found.others == {}
+    unseen = Stability("explained", (("backlash",),), said[3:])
+    assert unseen.sentences[1] == "backlash: named in 0 of 0 variations that could show it."
 
 
 def test_what_the_integrator_held_when_a_record_began_is_no_load() -> None:
