@@ -16,7 +16,7 @@ from gaident.diagnosis.controller.as_read import as_read
 from gaident.diagnosis.controller.controller_place import controller_findings
 from gaident.diagnosis.controller.driving import Driving
 from gaident.diagnosis.controller.joint_numbers import joint_numbers
-from gaident.diagnosis.experiments.candidates import candidates, loop_notes
+from gaident.diagnosis.experiments.candidates import candidates, loop_notes, unresolved
 from gaident.diagnosis.experiments.excitation import excitation
 from gaident.diagnosis.explain.alternatives import LOG_SHIFT, alike_here, alternatives_of, impossible_here, integrator_start
 from gaident.diagnosis.explain.bending import bent_by, relevance_of
@@ -131,14 +131,14 @@ class Work:
         allowed, self.not_testable = candidates(self.records, self.clean, self.data, self.excited, self.at_controller)
         self.notes += [ADVICE] * any(folded(r) for r in self.records)
         self.notes += loop_notes(self.data)
-        rest = self.scales, self.idn.model, allowed, self._equivalent_here, self._say
-        found, older = searched(
-            self.objective,
-            self.scales,
-            self.idn.model,
-            lambda objective, most, beside: selected(objective, *rest, min(most, self.most), beside),
-        )
+
+        def search(objective: Objective, most: int, beside: Fit | None) -> Selection:
+            shown = [t for t in allowed if t.name not in unresolved(objective.data)], self._equivalent_here, self._say
+            return selected(objective, self.scales, self.idn.model, *shown, min(most, self.most), beside)
+
+        found, older = searched(self.objective, self.scales, self.idn.model, allowed, search)
         self.notes += older
+        self.not_testable |= unresolved(found.space.data)
         self.note(0.85, "looking for what is left")
         self.take(found)
         simpler = attribution.simplified(found.space, found.final, self.left)
@@ -290,6 +290,7 @@ class Work:
         if (damping := negative_damping(mechanics)) is not None:
             driver = driver or "velocity"
             self.notes.append(drives_itself(damping))
+        driver = driver or ("past" if of_no_axis(mechanics) else None)
         real = [f for f in findings if not f.is_noise]
         answered = {*self.not_testable, *(name for f in findings for name in (f.effect, *f.alternatives))}
         self.notes += (doubts := like_filters(self.data, in_series(self.final)))

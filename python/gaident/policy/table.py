@@ -297,6 +297,9 @@ class Decisions:
     ahead_exact: float = loop(
         0.02, "lines", "to which the regression knows by how much a torque is ahead; else the model that is found shows it", AHEAD
     )
+    peak_lines: int = loop(
+        3, "lines", "of a log slower than its controller, that the largest torques last at least to show a limit of them", AHEAD
+    )
     slowest_lag: float = loop(
         100.0, "samples", "time constant at most of a lag behind the controller's torque; a current loop is faster", LAGS
     )

@@ -147,7 +147,7 @@ def test_a_search_with_an_encoders_age_is_made_whole_only_where_fewer_effects_ma
         ({0: (0, -5.0), 4: (1, -9.0)}, True, False),  # the whole search ends with as many effects
     ):
         search = Searches((1, 0.0), older)
-        found, notes = sensor_age.searched(objective, scales, model, search)
+        found, notes = sensor_age.searched(objective, scales, model, (), search)
         assert search.asked == [(False, 4), (True, 0), *[(True, 4)] * whole]
         assert search.beside == [None, None, *[closest] * whole], "the model that was found has more effects than none"
         assert bool(notes) is taken and len(found.final.effects) == (0 if taken else 1)
@@ -167,7 +167,7 @@ def test_a_search_with_an_encoders_age_is_made_whole_only_where_fewer_effects_ma
         # The linear mechanism speaks against the age, so that both searches are made.
         monkeypatch.setattr(sensor_age, "_score", lambda objective, scales, model: 99.0 * margin * (objective.data.age > 0.0))
         search = Searches((1, 0.0), {4: (effects, score)})
-        found, notes = sensor_age.searched(objective, scales, model, search)
+        found, notes = sensor_age.searched(objective, scales, model, (), search)
         assert search.asked == [(False, 4), (True, 4)] and bool(notes) is taken
 
 
@@ -182,7 +182,7 @@ def test_a_logged_torque_that_does_not_follow_from_its_controller_may_go_on_betw
     period = ga.Cascade(GAINS, period=DT / every) if every > 1 else GAINS
     data = replace(data, read=read, controller=period, loop_follows=follows)
     for name, found in (
-        ("_ahead", None),
+        ("ahead_of_line", None),
         ("_over_older", (SimpleNamespace(effects=("lag",)), False)),
         ("encoder_lines", 0),
         ("encoder_step", 0.01),
@@ -191,6 +191,6 @@ def test_a_logged_torque_that_does_not_follow_from_its_controller_may_go_on_betw
         monkeypatch.setattr(sensor_age, name, lambda *arguments, found=found: found)
     search = Searches((1, 0.0), {0: (0, 5.0)})
     model = ga.OneMass(J=3e-4, D=2e-3).model()
-    sensor_age.searched(Objective(data, objective.weight), scales_of(objective.data), model, search)
+    sensor_age.searched(Objective(data, objective.weight), scales_of(objective.data), model, (), search)
     ahead = (-0.5,) if logged and not follows and every == 1 else ()
     assert search.ages == [(0.0, ahead), (0.5 / every, (0.0, *ahead))]

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
 
 import gaident as ga
-from drive_rig import Noise, Plant, rig, skip_without_library
+from drive_rig import Noise, Plant, log_of, rig, skip_without_library
+from gaident.diagnosis.experiments.candidates import unresolved
 from gaident.estimation.regression.torque_lag import torque_lag
 from gaident.models.made_torque import late
 
@@ -87,3 +90,36 @@ def test_a_jump_at_the_first_line_moves_no_torque() -> None:
     rec = rig(plant, angle, friction, Noise(white=0.02), 1, position_logged=True).with_channels(position_command=None)
     seen = torque_lag(rec)
     assert seen is not None and abs(seen.lag) < 0.1, seen
+
+
+def test_of_an_axis_under_gravity_nothing_is_named_that_the_torque_between_the_lines_makes() -> None:
+    """A 100 Hz log of a 1 kHz controller, which nobody gave: 0.45 lines. Held, it had a second mass, and gravity at both ends."""
+    skip_without_library()
+    gains, fast, every = ga.PI(0.5, 4.0), 1e-3, 10
+    plant = Plant(J=0.02, D=0.05, kp=0.5, ki=4.0, dt=every * fast, cascade=ga.Cascade(gains, period=fast))
+    levels = np.random.default_rng(2).uniform(-8.0, 8.0, 16)
+    asked = np.repeat(levels, 150 * every)
+    command = np.zeros(len(asked))
+    for k in range(1, len(asked)):
+        command[k] = command[k - 1] + np.clip(asked[k] - command[k - 1], -0.03, 0.03)
+    hidden = {"coulomb_friction": {"torque": 0.3}, "unbalance": {"amplitude": 1.0, "phase": 0.0}}
+    rec = log_of(plant, command, hidden, Noise(white=0.02), 1).with_channels(command=None)
+    assert torque_lag(rec) is not None, "gravity is part of the regression"
+    dia = ga.diagnose(rec)
+    assert any("goes on, as that of a controller" in note for note in dia.notes), dia.summary()
+    assert sorted(f.effect for f in dia.causes) == ["coulomb_friction", "unbalance"], dia.summary()
+    assert dia.mechanics["inertia"].value == pytest.approx(0.02, rel=0.01) and "stiffness" not in dia.mechanics
+    found = {f.effect: f.parameters for f in dia.causes}
+    assert found["coulomb_friction"]["torque"].value == pytest.approx(0.3, rel=0.02)
+    assert found["unbalance"]["amplitude"].value == pytest.approx(1.0, rel=0.01)
+
+
+@pytest.mark.parametrize(("lines", "age", "looked_for"), [(1, -0.45, False), (2, -0.45, False), (3, -0.45, True), (1, 0.0, True)])
+def test_peaks_between_the_lines_of_a_log_show_no_limit_of_the_torque(lines: int, age: float, looked_for: bool) -> None:
+    torque = np.full(100, 0.2)
+    torque[40 : 40 + lines] = 1.0
+    torque[60:62] = 0.9, -0.9  # on either side: two peaks of one line
+    data: Any = SimpleNamespace(age=age, torque_logged=True, driven=[ga.Record(0.01, velocity=torque, torque=torque)])
+    why = unresolved(data)
+    assert (not why) == looked_for
+    assert looked_for or (set(why) == {"torque_saturation"} and "log every sample" in why["torque_saturation"])

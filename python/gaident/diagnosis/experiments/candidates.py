@@ -4,6 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+import numpy as np
+from numpy.typing import NDArray
+
 from gaident.axis import Text, say
 from gaident.data.record import Record
 from gaident.diagnosis.controller.controller_place import AtController
@@ -12,8 +15,11 @@ from gaident.diagnosis.library.terms import LIBRARY
 from gaident.diagnosis.records.folded import FOLDED, folded
 from gaident.estimation.dataset import DataSet
 from gaident.estimation.term import Term
+from gaident.policy.table import POLICY
 
-__all__ = ["IN_MOTION", "candidates", "loop_notes"]
+__all__ = ["IN_MOTION", "candidates", "loop_notes", "unresolved"]
+
+Vector = NDArray[np.float64]
 
 IN_MOTION = say(
     "A record starts in motion, and the loop of this controller is simulated from rest only: the logged {torque} drives the "
@@ -60,6 +66,32 @@ def candidates(
     replayed = [name for name in inside if LIBRARY[name].replayable]
     out = {*why, *at.decided, *decided_by_the_angle(clean), *(replayed if outside else ())}
     return [t for t in LIBRARY.values() if t.name not in out], why
+
+
+def unresolved(data: DataSet) -> dict[str, Text]:
+    """Effect that acts at the largest torques only -> why lines between which the torque goes on are too far apart for it.
+
+    How high a torque rises between two lines is not known: a jump of the command is over before the next one.
+    """
+    if data.age >= 0.0 or not data.torque_logged:
+        return {}
+    longest = max(_at_the_top(r.torque) for r in data.driven if r.torque is not None)
+    if longest >= POLICY.peak_lines:
+        return {}
+    text = (
+        "the {torque} goes on between the lines of the log, and its peaks last {} of them: how high they are is not known; log "
+        "every sample of the controller"
+    )
+    why = say(text, f"{longest} line{'s' * (longest != 1)}")
+    return {t.name: why for t in LIBRARY.values() if t.at_peaks}
+
+
+def _at_the_top(torque: Vector) -> int:
+    """Lines in a row that a torque [N m] (n,) is above half of its largest value, on one side; the most of them."""
+    size = np.abs(torque)
+    high = size >= 0.5 * np.max(size)  # no decision: a formula: the width of a peak at half its height
+    ends = np.flatnonzero(np.diff(np.concatenate([[0], np.sign(torque) * high, [0]])))
+    return int(np.max(np.diff(ends)[high[ends[:-1]]], initial=0))
 
 
 def _not_in_loop(data: DataSet, at: AtController) -> Text | None:

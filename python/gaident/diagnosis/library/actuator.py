@@ -17,6 +17,7 @@ CAUSES: tuple[Cause, ...] = (
         domains=OF_THE_TORQUE,
         needs=(t.torque_changes,),
         unseen=t.torque_beyond,
+        at_peaks=True,
         excited_by=("steps of three sizes",),
         alike={ONE_SIZE_UNLOGGED: ("limit",)},
     ),

@@ -20,16 +20,13 @@ A search without it fits it as a delay or, beside a current loop, as a resonance
   both under the errors of the first search.
 
 A torque that drives the model is held over each line of the log.
-The torque of a controller which is faster than the log changes between the lines:
-its mean over a line of r samples is (r - 1)/(2r) lines ahead, less the age of the velocity.
-No axis moves before its torque.
-So where the inverse-dynamics regression shows such a motion, the age is below 0 (estimation/regression/torque_lag.py).
+The torque of a controller which is faster than the log changes between the lines, and the age is below 0 (`torque_ahead.py`).
 A delay of less than half a line does not show in such a log.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -43,15 +40,13 @@ from gaident.diagnosis.selection.bases import Task
 from gaident.diagnosis.selection.mechanisms import is_mechanism, on_a_shaft, one_mass, reduced, resonance, swings
 from gaident.diagnosis.selection.moves import Moves
 from gaident.diagnosis.selection.select import Selection
+from gaident.diagnosis.selection.torque_ahead import ahead_of_line, closer
 from gaident.estimation import least_squares as ls
 from gaident.estimation.dataset import DataSet
 from gaident.estimation.noise_model import WHITE
 from gaident.estimation.objective import Fit, Innovations, Objective
-from gaident.estimation.regression.force_error import band_of
-from gaident.estimation.regression.torque_lag import TorqueLag, torque_lag
 from gaident.estimation.term import Scales, Term
 from gaident.models.drive_torque import HALF
-from gaident.models.held_torque import sampled_between
 from gaident.models.model import Model
 from gaident.policy.table import POLICY
 
@@ -59,14 +54,17 @@ __all__ = ["searched"]
 
 Vector = NDArray[np.float64]
 
-EXACT = 1e-3  # no decision: lines, what the parabola of a lag is exact to
-
 
 def searched(
-    objective: Objective, scales: Scales, model: Model, search: Callable[[Objective, int, Fit | None], Selection]
+    objective: Objective,
+    scales: Scales,
+    model: Model,
+    allowed: Sequence[Term],
+    search: Callable[[Objective, int, Fit | None], Selection],
 ) -> tuple[Selection, list[Text]]:
     """What a search selects over records whose velocity is as old as they show, with a note on that.
 
+    allowed: the effects that are searched for.
     search: of these records, with at most so many effects; what it ends with is compared with a model that is given.
     """
     most = POLICY.most_effects
@@ -75,7 +73,8 @@ def searched(
     if controller is not None and (controller.loop == "continuous" or (any(data.moving) and not data.told_by_torque)):
         return search(objective, most, None), []
     every = 1 if controller is None else controller.log_every(data.dt)
-    if every == 1 and (ahead := _ahead(data, model)) is not None:
+    task = Task(objective, scales, model, tuple(allowed), lambda message: None)
+    if every == 1 and (ahead := ahead_of_line(task)) is not None:
         text = (
             "The motion comes {:.2g} ms before a {torque} that is held over each line of the log, which no axis does: between "
             "the lines the {torque} goes on, as that of a controller does that is faster than the log{}. The simulation has it; "
@@ -87,9 +86,9 @@ def searched(
             return search(Objective(data.aged(-lines, near), objective.weight, counter=objective.counter), most, None)
 
         found = under(ahead.lag)
-        closer = _refined(found, ahead)
-        found = found if closer is None else under(closer)
-        used = ahead.lag if closer is None else closer
+        lines = closer(found, ahead)
+        found = found if lines is None else under(lines)
+        used = ahead.lag if lines is None else lines
         late = ", or it was filtered or written late on its way into the log" if data.torque_measured else ""
         asked = "Log every sample." if controller is None else "Give the controller's period, or log every sample."
         return found, [say(text, 1e3 * used * data.dt, late, 1e3 * HALF * data.dt, asked)]
@@ -164,47 +163,6 @@ def _over_older(found: Selection, older: Objective, margin: float) -> tuple[Fit,
     space = replace(space, objective=replace(space.objective, data=older.data))
     closest = min((_fitted_to(older.data, f, space) for f in tries), key=space.score)
     return closest, space.score(closest) < found.space.score(final) - margin
-
-
-def _ahead(data: DataSet, model: Model) -> TorqueLag | None:
-    """By how many lines the mean of the torque over a line is ahead of it; None where it is not, or no held torque drives."""
-    drives = data.torque_logged and (data.open_runs or not data.loop_follows)
-    if not drives or any(sampled_between(r) for r in data.driven):
-        return None
-    # Seen from the velocity that is fitted, not from the position, which may be younger.
-    moving = [r.with_channels(position=None) for r in data.driven]
-    band = band_of(model, moving, below=POLICY.rigid_band)
-    shown = [lag for r in moving if (lag := torque_lag(r, band)) is not None]
-    if not shown:
-        return None
-    weights = np.array([max(lag.std, EXACT) ** -2 for lag in shown])
-    ahead = float(weights @ np.array([lag.lag for lag in shown]) / weights.sum())
-    std = float(weights.sum() ** -0.5)
-    if not ahead > max(POLICY.ahead_seen, POLICY.contradiction * std) or ahead > HALF + POLICY.contradiction * std:
-        return None
-    return TorqueLag(min(ahead, HALF), std, max(lag.left for lag in shown))
-
-
-def _refined(found: Selection, ahead: TorqueLag) -> float | None:
-    """With how many lines the model that was found comes closest, without what is late itself; None: no others than it had.
-
-    The regression of a rigid axis shows it less closely where the load swings.
-    """
-    from scipy.optimize import minimize_scalar
-
-    if ahead.std < POLICY.ahead_exact:
-        return None
-    space, final = found.space, found.final
-    for term in final.parameters.terms:
-        if term.in_series:
-            final = space.without(final, term.name)
-
-    def score(lines: float) -> float:
-        return _score_under(space.objective.data.aged(-float(lines)), final, space)
-
-    best = minimize_scalar(score, bounds=(0.0, HALF), method="bounded", options={"xatol": POLICY.ahead_exact})
-    closer = float(best.x)
-    return closer if abs(closer - ahead.lag) > POLICY.ahead_exact and best.fun < score(ahead.lag) else None
 
 
 def _score_beside(again: Selection, found: Selection) -> float:

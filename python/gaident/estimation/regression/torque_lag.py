@@ -1,10 +1,11 @@
 """By how many samples a logged torque stands behind the motion that it makes, from the inverse-dynamics regression.
 
     u_h(n)  = (u(n) + u(n-1))/2                 a torque held over each sample, as it shows in w(n+1) - w(n-1)
-    J(k)    = min |u_h(n + k) - J a - B w - C sign(w) - T|^2 / |u_h - mean(u_h)|^2,   |k| <= `log_late` + 1
+    J(k)    = min |u_h(n + k) - J a - B w - C sign(w) - T - g(theta)|^2 / |u_h - mean(u_h)|^2,   |k| <= `log_late` + 1
     lag     = where the parabola through the least of J and its neighbours has its lowest point
     std     = sqrt(J_min/(n_eff c)),   J(k) = J_min + c (k - lag)^2
 
+g is the gravity or the spring that the regression of the record chooses (`inverse_dynamics`), else 0.
 All channels pass the filter of the regression, and the low-pass of its decimation; but every sample is kept.
 No row contains what lies before or behind the record: continued beyond a jump at its start, torque and motion do not fit.
 With one row in ten the lag depended on which of them the log began with, by 0.05 to 0.1 samples where the load swings.
@@ -21,7 +22,9 @@ from numpy.typing import NDArray
 
 from gaident.data.record import Record
 from gaident.data.signals.decimation import low_passed, reach
+from gaident.errors import GaidentError
 from gaident.estimation.criterion import effective_samples
+from gaident.estimation.regression.inverse_dynamics import inverse_dynamics
 from gaident.estimation.regression.motion import ORDER, cutoff_of, motion_of
 from gaident.estimation.regression.regression import solve
 from gaident.estimation.regression.rows import decimation_of
@@ -31,6 +34,8 @@ from gaident.policy.table import POLICY
 __all__ = ["TorqueLag", "torque_lag"]
 
 Vector = NDArray[np.float64]
+
+OF_ANGLE = ("gravity", "spring")
 
 
 @dataclass(frozen=True)
@@ -42,10 +47,12 @@ class TorqueLag:
     left: float
 
 
-def torque_lag(rec: Record, cutoff_hz: float | None = None) -> TorqueLag | None:
+def torque_lag(rec: Record, cutoff_hz: float | None = None, axis: str = "rotary") -> TorqueLag | None:
     """The lag of the record's torque; None without one, or where the motion does not tell.
 
-    cutoff_hz: of the filter, at most; None: that of the regression. What swings above it is no rigid axis."""
+    cutoff_hz: of the filter, at most; None: that of the regression. What swings above it is no rigid axis.
+    axis: as in `inverse_dynamics`.
+    """
     if rec.torque is None:
         return None
     rec = rec[: POLICY.lag_samples]
@@ -55,6 +62,7 @@ def torque_lag(rec: Record, cutoff_hz: float | None = None) -> TorqueLag | None:
     held = 0.5 * (rec.torque + np.concatenate([rec.torque[:1], rec.torque[:-1]]))
     both = bool(np.any(rec.velocity > 0.0) and np.any(rec.velocity < 0.0))
     terms = ("inertia", "viscous", "coulomb", "offset") if both else ("inertia", "viscous", "offset")
+    terms += _of_angle(rec, cutoff, axis)
     motion = motion_of(rec.with_channels(torque=held), cutoff, ORDER)
     torque = motion.torque
     assert torque is not None
@@ -90,3 +98,12 @@ def torque_lag(rec: Record, cutoff_hz: float | None = None) -> TorqueLag | None:
     lowest = max(least - curvature * within**2, 0.0)
     std = float(np.sqrt(lowest / (effective_samples(residuals[best][::factor]) * curvature)))
     return TorqueLag(steps[best] + within, std, lowest) if std < POLICY.lag_std else None
+
+
+def _of_angle(rec: Record, cutoff: float, axis: str) -> tuple[str, ...]:
+    """The terms of the angle that the regression of a record chooses."""
+    try:
+        chosen = inverse_dynamics(rec, cutoff_hz=cutoff, axis=axis).terms
+    except GaidentError:
+        return ()
+    return tuple(term for term in chosen if term in OF_ANGLE)
