@@ -99,7 +99,7 @@ struct PyEffectRecord {
     EffectJob job;
 
     PyEffectRecord(const Clock& clock, RealArray in, RealArray measured_position, const RealArray& measured_velocity,
-                   double start_angle, const Loop& loop, RealArray fed_velocity, RealArray fed_torque)
+                   double start_angle, const Loop& loop, RealArray fed_velocity, RealArray fed_torque, double torque_before)
         : input(std::move(in)),
           position(std::move(measured_position)),
           velocity(measured_velocity),
@@ -119,6 +119,7 @@ struct PyEffectRecord {
         job.record.log_every = clock.log_every;
         job.record.sample_time = clock.period;
         job.record.start_angle = start_angle;
+        job.record.torque_before = torque_before;
         for (const double w : view(velocity)) job.record.top_speed = std::max(job.record.top_speed, std::abs(w));
         job.loop = loop;
         if (job.loop.kind == LoopKind::open || (job.loop.kind == LoopKind::servo && job.loop.servo.position_gain > 0.0)) return;
@@ -330,9 +331,10 @@ void bind_effects(py::module_& m) {
     py::class_<EffectModel>(m, "EffectModel")
         .def(py::init(&make_model), py::arg("gain"), py::arg("poles"), py::arg("zeros"), py::arg("effects"));
     py::class_<PyEffectRecord>(m, "EffectRecord")
-        .def(py::init<const Clock&, RealArray, RealArray, const RealArray&, double, const Loop&, RealArray, RealArray>(),
+        .def(py::init<const Clock&, RealArray, RealArray, const RealArray&, double, const Loop&, RealArray, RealArray, double>(),
              py::kw_only(), py::arg("clock"), py::arg("input"), py::arg("position"), py::arg("velocity"), py::arg("start_angle"),
-             py::arg("loop"), py::arg("velocity_feedforward") = RealArray(), py::arg("torque_feedforward") = RealArray())
+             py::arg("loop"), py::arg("velocity_feedforward") = RealArray(), py::arg("torque_feedforward") = RealArray(),
+             py::arg("torque_before") = 0.0)
         .def("simulate", &simulate_models, py::arg("models"), py::arg("initial_states"), py::arg("substeps"), py::arg("workers"),
              py::arg("all"), py::arg("kernel") = "", py::arg("lanes") = true, py::arg("own") = OwnList())
         .def("simulate_values", &simulate_values, py::arg("values"), py::arg("structure"), py::arg("effects"),

@@ -317,6 +317,7 @@ class EffectRecord:
         loop: Loop,
         velocity_feedforward: NDArray[np.float64] = ...,
         torque_feedforward: NDArray[np.float64] = ...,
+        torque_before: float = ...,
     ) -> None: ...
     def simulate(
         self,

@@ -188,7 +188,7 @@ void prepare_effects(const EffectModel& model, const EffectRecord& record, const
     const bool moving = start != nullptr;
     const double u = moving && !open ? start[s.poles()] : 0.0;
     c.stored = u;
-    c.before = !moving ? 0.0 : open && !record.input.empty() ? record.input[0] : u;
+    c.before = open ? record.torque_before : u;
     bool possible = true;
     AllEffects::each([&]<class E>() {
         if (!model.effects.has<E>()) return;

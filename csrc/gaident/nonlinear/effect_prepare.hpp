@@ -15,6 +15,7 @@ struct EffectRecord {
     double sample_time = 0.0;                                          // of these signals, and of the controller
     int log_every = 1;                                                 // outputs are those of the first of so many samples
     double start_angle = 0.0;
+    double torque_before = 0.0;  // of the open loop, before the record [N m]
     double top_speed = 0.0;  // of the measured velocity [rad/s], for the choice of substeps
 };
 

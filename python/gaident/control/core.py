@@ -80,12 +80,18 @@ def discrete(gain: float, poles: Roots, zeros: Roots, dt: float, controller: Con
 
 
 def effect_record(
-    dt: float, source: Vector, position: Vector | None, velocity: Vector, start_angle: float, controller: Controller | None
+    dt: float,
+    source: Vector,
+    position: Vector | None,
+    velocity: Vector,
+    start_angle: float,
+    controller: Controller | None,
+    torque_before: float = 0.0,
 ) -> _core.EffectRecord:
     """A record and its loop, for models with effects and for every controller.
 
     source: command [rad/s], in the open loop torque [N m], with a position controller position command [rad]; of
-    `Controller.source_of`.
+    `Controller.source_of`. torque_before: of the open loop, before a record that begins at rest [N m].
     """
     ticks = of_lines(source, position) if controller is None else controller.ticks(dt, source, position)
     return _core.EffectRecord(
@@ -97,6 +103,7 @@ def effect_record(
         loop=loop(controller, dt),
         velocity_feedforward=ticks.velocity_feedforward,
         torque_feedforward=ticks.torque_feedforward,
+        torque_before=torque_before,
     )
 
 

@@ -31,7 +31,7 @@ from gaident.models import simulate
 from gaident.models.made_torque import stored_torque
 from gaident.models.model import Model
 from gaident.models.simulate import initial_state
-from gaident.models.starts import noise_std, starts_moving
+from gaident.models.starts import noise_std, starts_moving, torque_before
 from gaident.policy.table import POLICY
 from gaident.results.fitness import IN_SAMPLE, Fitness
 
@@ -287,6 +287,9 @@ def start_state(model: Model, rec: Record, controller: Controller | None, read: 
     if controller is not None and loop is not None and (stored := stored_torque(rec, loop)):
         return np.append(np.zeros(model.mechanism.order), stored)
     pi = bare_pi(loop)
+    if controller is None and not starts_moving(rec, pi):
+        before = torque_before(rec, 0.0 if read is None else stored_torque(rec, read))
+        return np.append(np.zeros(model.mechanism.order), before) if before else None
     if not starts_moving(rec, pi) or (controller is not None and (controller.limited or model.effects)):
         return None
     if not model.effects:

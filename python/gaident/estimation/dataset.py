@@ -8,7 +8,7 @@ Noise inside the loop then acts in the model as on the drive; the true parameter
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -30,7 +30,7 @@ from gaident.models.drive_torque import as_late, torque_of
 from gaident.models.made_torque import stored_torque
 from gaident.models.simulate_many import LoadedRecord
 from gaident.models.simulation_input import followed
-from gaident.models.starts import noise_std, starts_moving
+from gaident.models.starts import noise_std, starts_moving, torque_before
 from gaident.policy.table import POLICY
 
 __all__ = ["DataSet", "with_angle"]
@@ -263,14 +263,19 @@ class DataSet:
 
         Where their torque drives a model they are made ready for a velocity of this age: see `ready`.
         """
-        ready: Callable[[Record, int], Record] = self.ready if controller is None else lambda rec, at: rec
         for name in ("records", "driven", "turned", "free"):
             if records is getattr(self, name):
                 key = name, controller
                 if key not in self._loaded:
-                    self._loaded[key] = tuple(LoadedRecord.of(ready(r, i), controller) for i, r in enumerate(records))
+                    self._loaded[key] = tuple(self.load(r, i, controller) for i, r in enumerate(records))
                 return self._loaded[key]
-        return tuple(LoadedRecord.of(ready(r, i), controller) for i, r in enumerate(records))
+        return tuple(self.load(r, i, controller) for i, r in enumerate(records))
+
+    def load(self, rec: Record, at: int, controller: Controller | None) -> LoadedRecord:
+        """One record as the core takes it; at: its place among the records."""
+        if controller is not None:
+            return LoadedRecord.of(rec, controller)
+        return LoadedRecord.of(self.ready(rec, at), None, torque_before(rec, self.stored[at]))
 
     @cached_property
     def _loaded(self) -> dict[tuple[str, Controller | None], tuple[LoadedRecord, ...]]:

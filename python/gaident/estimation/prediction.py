@@ -33,7 +33,6 @@ from gaident.models.model import Model
 from gaident.models.own_effects import OWN
 from gaident.models.roots import quadratic_roots
 from gaident.models.simulate import simulate
-from gaident.models.simulate_many import simulate_values
 from gaident.models.starts import noise_std
 
 __all__ = [
@@ -265,9 +264,9 @@ def _of_true_angle(
         closed = controller is not None
         states = parameters.standing(1, data.stored[i]) if closed else parameters.start_values(x[None, :], i)
         turned = with_angle(record, angle)
-        ready = data.ready(turned, i) if controller is None else turned
         taken = data.steps_of(steps) if controller is None else steps
-        run = simulate_values(parameters.structure, names, values, ready, controller, initial_states=states, substeps=taken)
+        loaded = data.load(turned, i, controller)
+        run = loaded.velocities(parameters.structure, names, values, initial_states=states, substeps=taken)
         parts.append(data.seen(run) if controller is None else run)
     return np.concatenate(parts, axis=1)
 

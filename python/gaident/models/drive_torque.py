@@ -18,7 +18,7 @@ from gaident.data.torque_kind import MEAN, SAMPLE
 from gaident.errors import RecordError
 from gaident.models.held_torque import held_mean
 from gaident.models.made_torque import late, made_at_its_clock, stored_torque
-from gaident.models.starts import starts_moving
+from gaident.models.starts import torque_before
 
 __all__ = [
     "HALF",
@@ -55,7 +55,7 @@ def driven_by(rec: Record, controller: Controller, made: Vector | None = None) -
     torque = made_by(rec, controller) if rec.torque is None else rec.torque
     whole = rec.with_channels(torque=torque)
     stored = stored_torque(whole, controller, driven=False)
-    before = torque[0] if starts_moving(whole, None) else stored
+    before = torque_before(whole, stored)
     if every > 1:
         at_clock = _at_its_clock(rec, torque, controller, stored, made).reshape(len(rec), every)
         torque = _mean_ahead(torque, at_clock) if rec.torque_log == MEAN else at_clock.mean(axis=1)
@@ -79,7 +79,7 @@ def straight_driven(rec: Record, controller: Controller) -> Record:
     """
     assert rec.torque is not None
     every = controller.log_every(rec.dt)
-    before = rec.torque[0] if starts_moving(rec, None) else 0.0
+    before = torque_before(rec)
     straight = _straight(rec, rec.torque, every).reshape(len(rec), every)
     mean = _mean_ahead(rec.torque, straight) if rec.torque_log == MEAN else straight.mean(axis=1)
     return rec.with_channels(torque=late(mean, controller.delay / rec.dt, before), torque_log=SAMPLE)
@@ -169,7 +169,7 @@ def as_late(rec: Record, lines: float) -> Record:
     """The record with its torque so many lines of the log later [1], or earlier: as its velocity is older, or younger."""
     if not lines or rec.torque is None:
         return rec
-    before = rec.torque[0] if starts_moving(rec, None) else 0.0
+    before = torque_before(rec)
     return rec.with_channels(torque=late(rec.torque, lines, before))
 
 

@@ -123,6 +123,8 @@ def run(
         None: at rest.
         Otherwise what `gaident.initial_state` gives: p + q numbers of the plant, the first of them the velocity [rad/s] before
         the first input acts; with a controller one more, its stored torque [N m].
+        In the open loop one more may be given, too: the torque that acted before the record [N m], which a delay and a lag of
+        the torque contain where it begins. Without it that is the first torque, and 0 at rest.
     arithmetic : str
         "double", or "float" for 32-bit arithmetic (within 1e-4 of the response; models without effects).
         Or a drive's (docs/dsp.md): from rest, in the continuous loop without limits; NaN once it has left its range.
@@ -237,7 +239,12 @@ def _simulated(
     source, what = input_of(plant, rec, controller)
     start = np.zeros(0) if state is None else states_of(state, "initial_state")
     if state is not None:
-        check_start(plant, controller, start, what)
+        check_start(plant, controller, start, what, before=True)
+    before = 0.0
+    if controller is None and len(start):
+        order = plant.mechanism.order
+        before = float(start[order] if len(start) > order else source[0])
+        start = start[:order]
     steps = checked_substeps(substeps)
     if arithmetic not in ("double", "float") and not plant.effects:
         _check_drive(controller, state, arithmetic)
@@ -249,7 +256,7 @@ def _simulated(
             'simulated in "double" only'
         )
     starts = start.reshape(1, -1) if state is not None else np.zeros((0, 0))
-    found = simulated_with_effects(core_record(rec, source, controller), [plant], starts, steps, 1, True)
+    found = simulated_with_effects(core_record(rec, source, controller, before), [plant], starts, steps, 1, True)
     velocity, torque, angle = (signal[0] for signal in found)
     return velocity, torque, angle
 

@@ -94,7 +94,7 @@ def simulate_many(
             raise ModelError(f"initial_states has the shape {starts.shape}: give one row per model, {len(plants)}")
         for i, plant in enumerate(plants):
             check_start(plant, controller, starts[i], "command" if controller is not None else "torque")
-    record = core_record(rec, source, controller)
+    record = core_record(rec, source, controller, float(source[0]) if controller is None and starts.size else 0.0)
     return simulated_with_effects(record, plants, starts, checked_substeps(substeps), workers, False)[0]
 
 
@@ -135,8 +135,8 @@ def simulate_values(
     ModelError
         For a wrong shape or unknown names.
     """
-    input_for(structure.p, rec, controller)
-    loaded = LoadedRecord.of(rec, controller)
+    source, _ = input_for(structure.p, rec, controller)
+    loaded = LoadedRecord.of(rec, controller, 0.0 if controller is not None or initial_states is None else float(source[0]))
     return loaded.velocities(structure, effects, values, initial_states=initial_states, substeps=substeps, workers=workers)
 
 
@@ -148,10 +148,10 @@ class LoadedRecord:
     controller: Controller | None
 
     @classmethod
-    def of(cls, rec: Record, controller: Controller | None) -> LoadedRecord:
-        """Of a record that has what drives the loop; RecordError else."""
+    def of(cls, rec: Record, controller: Controller | None, before: float = 0.0) -> LoadedRecord:
+        """Of a record that has what drives the loop; RecordError else. before: as in `core_record`."""
         source, _ = input_for(1, rec, controller)
-        return cls(core_record(rec, source, controller), controller)
+        return cls(core_record(rec, source, controller, before), controller)
 
     def velocities(
         self,

@@ -95,9 +95,11 @@ def check_workers(workers: object) -> None:
         raise ModelError(f"workers is {workers!r:.80}: give a number of threads, from 1 to {MOST_WORKERS}")
 
 
-def check_start(plant: Model, controller: Controller | None, start: Signal, what: str) -> None:
+def check_start(plant: Model, controller: Controller | None, start: Signal, what: str, before: bool = False) -> None:
+    """ModelError where a start state has another size; before: it may have the torque before the record, too."""
     size = plant.mechanism.order + (controller is not None)
-    if start.shape != (size,):
+    sizes = (size, size + 1) if before and controller is None else (size,)
+    if start.ndim != 1 or len(start) not in sizes:
         raise ModelError(
             f"initial_state has the shape {start.shape}: this model driven by the {what} has "
             f"{size} states; use gaident.models.initial_state(model, rec, controller)"
@@ -115,9 +117,11 @@ def checked_substeps(substeps: int | None) -> int:
     return substeps
 
 
-def core_record(rec: Record, source: Signal, controller: Controller | None) -> _core.EffectRecord:
+def core_record(rec: Record, source: Signal, controller: Controller | None, before: float = 0.0) -> _core.EffectRecord:
+    """A record as the core takes it; before: the torque that acted before it, of an open loop from rest [N m]."""
     start = 0.0 if controller is None else controller.start_angle(source)
     if rec.position is not None:
         start = float(rec.position[0])
     between = None if controller is None else controller.source_of(rec)
-    return core.effect_record(rec.dt, source if between is None else between, rec.position, rec.velocity, start, controller)
+    source = source if between is None else between
+    return core.effect_record(rec.dt, source, rec.position, rec.velocity, start, controller, before)

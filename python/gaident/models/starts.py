@@ -11,7 +11,7 @@ from gaident.data.record import Record
 from gaident.data.signals.lattice import changes
 from gaident.policy.table import POLICY
 
-__all__ = ["constant_beside", "doubtful_start", "noise_std", "starts_moving", "stretches"]
+__all__ = ["constant_beside", "doubtful_start", "noise_std", "starts_moving", "stretches", "torque_before"]
 
 
 def noise_std(velocity: NDArray[np.float64], step: float = 0.0) -> float:
@@ -60,6 +60,22 @@ def starts_moving(rec: Record, controller: Controller | None) -> bool:
     return _first_is_motion(rec, controller) and not _constant_input(rec, controller)
 
 
+def torque_before(rec: Record, stored: float = 0.0) -> float:
+    """The torque that acted before a record [N m], which a delay or a lag of the torque still contains where it begins.
+
+    That of its first line where the record begins in motion, or a standstill is held first: so is the torque.
+    Else what an integrator stored before the record, for a load; 0 where that is not known.
+    """
+    if rec.torque is None:
+        return 0.0
+    if starts_moving(rec, None):
+        return float(rec.torque[0])
+    if stored:
+        return stored
+    first = rec.velocity[: POLICY.held_samples]
+    return float(rec.torque[0]) if np.all(np.abs(first) <= _rest(rec)) else 0.0
+
+
 def constant_beside(off: NDArray[np.float64], size: float) -> float:
     """The mean of what a torque of this size is off by [N m], where it stands out of the rest and is not to be neglected; or 0.
 
@@ -90,16 +106,20 @@ def _constant_input(rec: Record, controller: Controller | None) -> bool:
 
 
 def _first_is_motion(rec: Record, controller: Controller | None) -> bool:
+    first = float(rec.velocity[0])
+    if controller is not None and controller.loop == "continuous" and rec.command is not None and rec.command[0] != 0.0:
+        passed = first / float(rec.command[0])
+        if 0.0 <= passed <= POLICY.rest_share:
+            return False
+    return abs(first) > _rest(rec)
+
+
+def _rest(rec: Record) -> float:
+    """Velocity up to which the axis of a record stands [rad/s]."""
     w = rec.velocity
     steps = np.concatenate([changes(part) for part in stretches(w)])
     moved = steps[steps > 0.0]
     # Repeats betray a quantised signal.
     quantum = float(moved.min()) if len(moved) and len(moved) < POLICY.repeats * len(steps) else 0.0
     top = max(float(w.max()), -float(w.min()))
-    tolerance = max(POLICY.above_noise * noise_std(w), POLICY.rest_steps * quantum, POLICY.negligible * top)
-    first = float(w[0])
-    if controller is not None and controller.loop == "continuous" and rec.command is not None and rec.command[0] != 0.0:
-        passed = first / float(rec.command[0])
-        if 0.0 <= passed <= POLICY.rest_share:
-            return False
-    return abs(first) > tolerance
+    return max(POLICY.above_noise * noise_std(w), POLICY.rest_steps * quantum, POLICY.negligible * top)

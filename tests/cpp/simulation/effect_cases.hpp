@@ -188,7 +188,8 @@ inline void check_motion(std::span<const EffectModel> nothing, double closed, do
     const double state[] = {20.0, 0.3, -0.02, 0.2};
     const double* const start = state;
     for (const LoopKind kind : {LoopKind::sampled, LoopKind::open, LoopKind::continuous}) {
-        const EffectJob job = job_of(r, kind);
+        EffectJob job = job_of(r, kind);
+        if (kind == LoopKind::open) job.record.torque_before = r[0];
         std::vector<double> linear(r.size()), w(r.size());
         const EffectModel plain{table_three(), {}};
         simulate_effects(job, {&plain, 1}, {&start, 1}, {linear.data()});

@@ -127,8 +127,8 @@ def searched(
     margin = -POLICY.rival_margin if lines else POLICY.rival_margin
     closest, better = _over_older(found, older, margin)
     limits = (most,) if better else (len(found.final.effects) - 1, most)
-    for allowed in limits:
-        again = search(older, allowed, closest if len(closest.effects) <= allowed else None)
+    for number in limits:
+        again = search(older, number, closest if len(closest.effects) <= number else None)
         if not _better(again, found, margin):
             return found, []
     return again, [_on_a_lattice(step, age)]

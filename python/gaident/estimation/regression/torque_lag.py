@@ -61,7 +61,7 @@ def torque_lag(rec: Record, cutoff_hz: float | None = None, axis: str = "rotary"
     factor = decimation_of(None, cutoff, rec.dt)
     held = 0.5 * (rec.torque + np.concatenate([rec.torque[:1], rec.torque[:-1]]))
     both = bool(np.any(rec.velocity > 0.0) and np.any(rec.velocity < 0.0))
-    terms = ("inertia", "viscous", "coulomb", "offset") if both else ("inertia", "viscous", "offset")
+    terms: tuple[str, ...] = ("inertia", "viscous", "coulomb", "offset") if both else ("inertia", "viscous", "offset")
     terms += _of_angle(rec, cutoff, axis)
     motion = motion_of(rec.with_channels(torque=held), cutoff, ORDER)
     torque = motion.torque
