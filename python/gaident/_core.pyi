@@ -286,8 +286,7 @@ def discrete(
 def effect_table() -> list[
     tuple[str, str, str, tuple[tuple[str, str, float, float, float, bool], ...], bool, bool, str, str, bool]
 ]:
-    """(name, place, meaning, parameters, simulated, needs two masses, relation, remark, turns) of every effect, those of
-    the shaft as they are at the motor."""
+    """(name, place, meaning, parameters, simulated, needs two masses, relation, remark, turns) of every effect, at the motor."""
 
 def broken_relation(name: str, values: Sequence[float]) -> str:
     """The relation between an effect's parameters that these values break, or ""."""

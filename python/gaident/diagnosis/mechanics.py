@@ -21,7 +21,7 @@ from gaident.models.two_mass import mechanics_with_shaft_damping
 from gaident.policy.table import POLICY
 from gaident.results.estimate import Estimate
 
-__all__ = ["MECHANICS", "base_shift", "mechanics_of", "moved", "negative_damping", "of_no_axis", "of_the_age", "slopes_of"]
+__all__ = ["MECHANICS", "base_shift", "mechanics_of", "moved", "of_no_axis", "of_the_age", "slopes_of"]
 
 Vector = NDArray[np.float64]
 
@@ -88,16 +88,10 @@ def _with_slopes(fit: Fit) -> tuple[Vector, NDArray[np.float64]]:
     return found, np.array([(_numbers(row) - found) / step for row, step in zip(parameters.base_values(X), h, strict=True)])
 
 
-def negative_damping(mechanics: Mapping[str, Estimate]) -> Estimate | None:
-    """The viscous friction where it is below 0 beyond its deviation; None where it may be that of an axis."""
-    found = mechanics.get("viscous_friction")
-    return found if found is not None and found.value < -POLICY.contradiction * found.std else None
-
-
-def of_no_axis(mechanics: Mapping[str, Estimate]) -> bool:
-    """Whether a damping is below 0 beyond its deviation: a mechanism that drives itself stands for something else."""
-    found = (mechanics.get(name) for name in ("viscous_friction", "resonance_damping", "antiresonance_damping"))
-    return any(e is not None and e.value < -POLICY.contradiction * e.std for e in found)
+def of_no_axis(mechanics: Mapping[str, Estimate]) -> str | None:
+    """The first damping below 0 beyond its deviation: a mechanism that drives itself stands for something else; None without."""
+    found = ((name, mechanics.get(name)) for name in ("viscous_friction", "resonance_damping", "antiresonance_damping"))
+    return next((name for name, e in found if e is not None and e.value < -POLICY.contradiction * e.std), None)
 
 
 def moved(before: Fit, after: Fit) -> dict[str, tuple[float, float]]:

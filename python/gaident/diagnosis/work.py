@@ -22,13 +22,13 @@ from gaident.diagnosis.explain.alternatives import LOG_SHIFT, alike_here, altern
 from gaident.diagnosis.explain.bending import bent_by, relevance_of
 from gaident.diagnosis.explain.determined import determined, not_determined
 from gaident.diagnosis.explain.held_out import standing
+from gaident.diagnosis.explain.late_inside import late_inside
 from gaident.diagnosis.explain.verdict import verdict_of
 from gaident.diagnosis.explain.wording import (
     ON_A_SPRING,
     basis_of,
     closer_numbers,
     closest,
-    drives_itself,
     evidence_of,
     far_off,
     hidden_by_torque_noise,
@@ -45,7 +45,7 @@ from gaident.diagnosis.library.record import findings_of_the_record
 from gaident.diagnosis.library.sides import called_of, name_of, sides_of
 from gaident.diagnosis.library.terms import LIBRARY, in_controller
 from gaident.diagnosis.linear_part import linear_of_part
-from gaident.diagnosis.mechanics import base_shift, mechanics_of, negative_damping, of_no_axis, of_the_age
+from gaident.diagnosis.mechanics import base_shift, mechanics_of, of_no_axis, of_the_age
 from gaident.diagnosis.note import Note
 from gaident.diagnosis.records.folded import ADVICE, folded
 from gaident.diagnosis.records.hygiene import cleaned, left_out, quantisation, unexplained
@@ -154,7 +154,7 @@ class Work:
     def _doubt_controller(self) -> None:
         again = self.driving.regained_from is not None
         self.gain_doubt = gain_doubt(self.found.space, self.final, again)
-        self.doubtful = self.gain_doubt.better is not None or of_no_axis(mechanics_of(self.under, self.estimate))
+        self.doubtful = self.gain_doubt.better is not None or of_no_axis(mechanics_of(self.under, self.estimate)) is not None
         self.form = None if again or self.form_refused else unlogged_form(self.found.space, self.final, self.doubtful)
 
     def with_joint_numbers(self) -> None:
@@ -274,6 +274,7 @@ class Work:
         gains, driver, causes, estimates, offset, mechanics, model, check = self.judged()
         findings = findings_of_the_record(self._spoiled(), sum(len(r) for r in self.records), self.step)
         findings += [replace(f, gain=gains.of(f.effect)) for f in self.controller_steps]
+        self.doubts = like_filters(self.data, in_series(self.final)) or late_inside(self.under, self.estimate)
         for effect in causes:
             gain, rivals = self.rivals[effect]
             never = impossible_here(effect, {e: estimates[e] for e in causes}) | self._told_by_the_current
@@ -287,14 +288,12 @@ class Work:
             said_by = evidence_of(effect, gain, alternatives, offset, sides if two else ())
             what = name_of(effect), estimates[effect], alternatives, gains.of(effect), gain, None, said_by, False
             findings.append(Finding(*what, LIBRARY[effect].place, sides))
-        if (damping := negative_damping(mechanics)) is not None:
-            driver = driver or "velocity"
-            self.notes.append(drives_itself(damping))
-        driver = driver or ("past" if of_no_axis(mechanics) else None)
+        if (impossible := of_no_axis(mechanics)) is not None:
+            driver = driver or ("velocity" if impossible == "viscous_friction" else "past")
         real = [f for f in findings if not f.is_noise]
         answered = {*self.not_testable, *(name for f in findings for name in (f.effect, *f.alternatives))}
-        self.notes += (doubts := like_filters(self.data, in_series(self.final)))
-        verdict = verdict_of(bool(real), driver is not None, bool(doubts) or (self.data.slower and self.driving.in_doubt))
+        self.notes += self.doubts
+        verdict = verdict_of(bool(real), driver is not None, bool(self.doubts) or (self.data.slower and self.driving.in_doubt))
         if driver is not None and (dropped := [e for e in self.final.effects if e not in causes]):
             shown = driver if self.left.gains[driver] > self.left.needed else None
             self.notes.append(closest(dropped, shown, bool(real)))
@@ -377,7 +376,7 @@ class Work:
     ) -> tuple[str, ...]:
         """Rivals, equivalent effects and, where the loop is not that of the drive, the controller; without untestable ones."""
         shown = attribution.shown_by_the_records(self.found.space, self.final, effect)
-        follows = not (self.data.slower and self.driving.in_doubt)
+        follows = not (self.data.slower and (self.driving.in_doubt or self.doubts))
         names = alternatives_of(effect, rivals, sorted(self._equivalent_here(effect)), bool(shown), offset, follows, never)
         names += integrator_start(effect, self.data) + [OTHER_GAINS] * (effect in self.gain_doubt.rivals)
         names += [LOG_SHIFT] * (LIBRARY[effect].in_series and not LIBRARY[effect].resonates and self.driving.moved.may_be_early)

@@ -22,7 +22,6 @@ __all__ = [
     "basis_of",
     "closer_numbers",
     "closest",
-    "drives_itself",
     "evidence_of",
     "far_off",
     "hidden_by_torque_noise",
@@ -114,13 +113,16 @@ def hidden_by_torque_noise(floor: float) -> Text:
     return say(text, floor)
 
 
-def drives_itself(damping: Estimate) -> Text:
+def _drives_itself(mechanics: Mapping[str, Estimate]) -> list[Text]:
     """Note on a negative viscous friction."""
+    damping = mechanics.get("viscous_friction")
+    if damping is None or damping.value >= -POLICY.contradiction * damping.std:
+        return []
     text = (
         "The viscous friction comes out negative ({:.2g} {N m s/rad}), which no axis has: friction that falls with the speed or "
         "does not depend on it, or a lag, is in its place. {Inertia} and friction are not to be trusted."
     )
-    return say(text, damping.value)
+    return [say(text, damping.value)]
 
 
 def _swings_up(mechanics: Mapping[str, Estimate]) -> list[Text]:
@@ -140,7 +142,7 @@ def of_the_mechanics(mechanics: Mapping[str, Estimate], ages: Mapping[str, float
     ages: name -> the part of its deviation that the age of the velocity makes; left_open: whether the controller was given with
     numbers that are not known.
     """
-    return _swings_up(mechanics) + _of_the_controller(mechanics, ages, data, left_open)
+    return _drives_itself(mechanics) + _swings_up(mechanics) + _of_the_controller(mechanics, ages, data, left_open)
 
 
 def torque_unlogged(data: DataSet) -> list[Text]:
