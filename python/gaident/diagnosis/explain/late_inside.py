@@ -42,8 +42,8 @@ def late_inside(objective: Objective, fit: Fit) -> list[Text]:
         return []
     text = (
         "In the loop of this controller the motion follows the {torque} by {:.3g} +- {:.2g} ms, behind the logged {torque} by "
-        "{:.3g} +- {:.2g} ms. So about {:.2g} ms of it are in the controller, before its {torque} is logged: a filter that was not "
-        "given, or another delay. What is called late below contains it."
+        "{:.3g} +- {:.2g} ms. So about {:.2g} ms of it are in the controller, before its {torque} is logged: a filter that was "
+        "not given, or another delay. What is called late below contains it."
     )
     return [say(text, 1e3 * inside, 1e3 * one, 1e3 * outside, 1e3 * other, 1e3 * (inside - outside))]
 
