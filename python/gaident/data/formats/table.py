@@ -46,6 +46,13 @@ class Stored:
         start, stop, _ = rows.indices(self.length)
         try:
             values = self.read(start, stop)
+        except ReadError:
+            raise
+        except MemoryError:
+            raise ReadError(
+                f"{self.path}: reading rows {start} to {stop - 1} takes more memory than there is; copy the file again, or save "
+                "the log in parts"
+            ) from None
         except Exception as error:  # every library has its own
             raise ReadError(
                 f"{self.path}: damaged, rows {start} to {stop - 1} cannot be read ({first_line(error)}); copy the file again"
