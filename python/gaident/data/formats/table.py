@@ -75,6 +75,7 @@ class Column:
     bad      (row, text) of the first cell that is no number, None if all are
     clock    key of the column with its time stamps, where the file says which
     period   sample time [s], where the file states it
+    note     what the record's notes say of it, "" if nothing
     """
 
     key: str
@@ -84,6 +85,7 @@ class Column:
     bad: tuple[int, str] | None = None
     clock: str | None = None
     period: float | None = None
+    note: str = ""
 
     def whole(self) -> NDArray[Any]:
         """All values, read if they are still in the file."""
