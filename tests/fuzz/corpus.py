@@ -7,7 +7,7 @@ import json
 import struct
 import tempfile
 import zlib
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -34,13 +34,13 @@ class Seed:
     weight: float = 1.0
 
 
-def seeds() -> list[Seed]:
-    """Every seed, in an order that does not change."""
+def seeds(forms: Sequence[str] = ()) -> list[Seed]:
+    """Every seed, in an order that does not change, or those of some formats."""
     found = [*_text(), *_binary(), *_sinumerik(), *_saved(), *_responses()]
-    for form, ending, make, weight in _FOREIGN:
+    for form, ending, make, weight in [row for row in _FOREIGN if not forms or row[0] in forms]:
         with suppress(ImportError):  # what is not installed cannot be read
             found += [Seed(form, ending, content, weight) for content in make()]
-    return found
+    return [seed for seed in found if not forms or seed.form in forms]
 
 
 def _text() -> Iterator[Seed]:

@@ -46,7 +46,7 @@ class Inputs:
 
     def __init__(self, seed: int, forms: Sequence[str]) -> None:
         self.seed = seed
-        self.corpus = [s for s in seeds() if not forms or s.form in forms]
+        self.corpus = seeds(forms)
         if not self.corpus:
             raise SystemExit(f"--forms {' '.join(forms)}: no such format, or its library is not installed")
         self.of_form: dict[str, list[bytes]] = defaultdict(list)
