@@ -27,8 +27,8 @@ ALLOWED = {
         "shtab reads how an option is completed from a field of the parser's option",
     ),
     "data/formats/foreign/child": (
-        {"os.cpu_count"},
-        "a process of our own, whose libraries start a thread for each processor else",
+        {"os.cpu_count", "sys.modules['pandas']"},
+        "a process of our own, whose libraries start a thread for each processor else, and import what they do not need",
     ),
     "data/formats/foreign/mdf": ({"channel.conversion"}, "asammdf applies what stands there, whatever it is asked"),
     "data/signals/arrays": ({"copy.flags.writeable"}, "NumPy: how an array is made read-only"),

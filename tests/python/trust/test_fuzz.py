@@ -89,10 +89,11 @@ def test_a_pair_of_roots_without_one_of_its_numbers_is_refused() -> None:
 
 def test_a_word_between_decimal_commas_and_blanks(tmp_path: Path) -> None:
     """Of as many numbers and words when it is cut at its commas: it was cut there, and gave 30 and 0000."""
-    rows = [f"{10 + k / 8:.3f} {('on', 'off')[k % 2]} {k / 10:.4f}".replace(".", ",") for k in range(40)]
-    (tmp_path / "log.dat").write_text("velocity state torque\n" + "\n".join(rows) + "\n")
-    rec = ga.read(tmp_path / "log.dat", dt=1e-3)
-    np.testing.assert_array_equal(rec.velocity, 10 + np.arange(40) / 8)
+    for form in ("{:.3f}", "{:.5e}"):
+        rows = [f"{form.format(10 + k / 8)} {('on', 'off')[k % 2]} {k / 10:.4f}".replace(".", ",") for k in range(40)]
+        (tmp_path / "log.dat").write_text("velocity state torque\n" + "\n".join(rows) + "\n")
+        rec = ga.read(tmp_path / "log.dat", dt=1e-3)
+        np.testing.assert_allclose(rec.velocity, 10 + np.arange(40) / 8, rtol=1e-5)
 
 
 @pytest.mark.parametrize("whole", [True, False], ids=["in memory", "in blocks"])

@@ -133,7 +133,7 @@ def _weigh(rows: list[list[str]], delimiter: str, decimal: str) -> tuple[Dialect
 def _text_between_numbers(cell: str) -> bool:
     """`30,0 on 10,5` that is cut at its commas leaves `0 on 10`."""
     words = cell.split()
-    return len(words) > 2 and words[0].isdigit() and words[-1].lstrip("+-").isdigit()
+    return len(words) > 2 and parse_number(words[0], ".") is not None and parse_number(words[-1], ".") is not None
 
 
 def _look_further(lines: Sequence[Line], found: Dialect) -> Dialect:
