@@ -15,6 +15,8 @@ from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, BinaryIO
 
+from gaident.files import detached_streams, limit_memory, limit_seconds
+
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
@@ -42,7 +44,7 @@ def main() -> None:
     os.cpu_count = lambda: 1
     signal.signal(signal.SIGINT, signal.SIG_DFL)
     warnings.simplefilter("ignore")
-    sources, answers = _streams()
+    sources, answers = detached_streams()
     from gaident.data.formats.foreign.wire import described, receive, send
     from gaident.errors import ReadError
 
@@ -93,22 +95,6 @@ def _answer(table: LogTable, sources: BinaryIO, answers: BinaryIO, limits: _Limi
             send(answers, {"values": True}, values_of(table, where))
 
 
-def _streams() -> tuple[BinaryIO, BinaryIO]:
-    """The parent's questions and where answers go; the usual streams lead nowhere from here on."""
-    questions, answers = os.dup(0), os.dup(1)
-    nowhere = os.open(os.devnull, os.O_RDWR)
-    for usual in (0, 1, 2):
-        os.dup2(nowhere, usual)
-    os.close(nowhere)
-    if sys.platform == "win32":
-        import msvcrt
-
-        msvcrt.setmode(questions, os.O_BINARY)
-        msvcrt.setmode(answers, os.O_BINARY)
-        msvcrt.SetErrorMode(msvcrt.SEM_FAILCRITICALERRORS | msvcrt.SEM_NOGPFAULTERRORBOX)  # no window at a crash
-    return os.fdopen(questions, "rb"), os.fdopen(answers, "wb")
-
-
 class _Limits:
     """Limits of memory and of processor time, which grow with the file and with what is asked for; on Linux and its like."""
 
@@ -120,29 +106,14 @@ class _Limits:
 
     def begin(self) -> None:
         """From here on the file counts, and no more the libraries."""
-        if sys.platform == "win32":
-            return
-        import resource
-
         self.before = _used()
-        resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
-        with suppress(OSError, ValueError):  # where a system has no such number or limit
-            pages = int(Path("/proc/self/statm").read_text().split()[0])
-            room = pages * resource.getpagesize() + _MEMORY + _MEMORY_TIMES * self.size
-            resource.setrlimit(resource.RLIMIT_AS, (room, resource.getrlimit(resource.RLIMIT_AS)[1]))
+        limit_memory(_MEMORY + _MEMORY_TIMES * self.size)
         self.grow(0)
 
     def grow(self, asked: int) -> None:
         """So many bytes of values more are asked for."""
-        if sys.platform == "win32":
-            return
-        import resource
-
         self.asked += asked
-        seconds = self.before + _SECONDS + (self.size + self.asked) / _RATE
-        with suppress(OSError, ValueError):
-            hard = resource.getrlimit(resource.RLIMIT_CPU)[1]
-            resource.setrlimit(resource.RLIMIT_CPU, (int(seconds) + 1, hard))
+        limit_seconds(self.before + _SECONDS + (self.size + self.asked) / _RATE)
 
 
 def _used() -> float:
