@@ -108,6 +108,15 @@ def test_a_last_line_that_ends_at_the_decimal_mark(tmp_path: Path, monkeypatch: 
             ga.read(path, dt=1e-3)
 
 
+def test_a_last_line_whose_quotation_mark_is_missing(tmp_path: Path) -> None:
+    rows = [f'"{k}","{k / 7!r}"' for k in range(40)]
+    path = tmp_path / "log.csv"
+    for cut in range(1, 6):
+        path.write_text('"torque","velocity"\n' + "\n".join(rows)[:-cut])
+        with pytest.raises(ga.GaidentError, match="line 41: the file ends within a number"):
+            ga.read(path, dt=1e-3)
+
+
 @pytest.mark.parametrize("whole", [True, False], ids=["in memory", "in blocks"])
 def test_a_last_number_that_may_be_cut_is_noted(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, whole: bool) -> None:
     monkeypatch.setattr(delimited, "WHOLE", 1 << 25 if whole else 0)

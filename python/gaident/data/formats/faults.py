@@ -68,7 +68,7 @@ class Thousands:
 def refuse_cut_line(path: str, numbers: Sequence[int], body: Sequence[str], dialect: Dialect) -> None:
     """Raises ReadError where the last of these lines, which has no line end, is cut within its last number.
 
-    That shows where it ends with the decimal mark, and where fewer characters stand behind that mark than in all other lines.
+    That shows where it ends with the decimal mark, lacks a quotation mark, or has fewer decimals than all other lines.
     Of whole numbers, and of numbers printed with as many digits as they need, it does not show.
     """
     last = _tail(body[-1], dialect)
@@ -76,10 +76,11 @@ def refuse_cut_line(path: str, numbers: Sequence[int], body: Sequence[str], dial
     mark = dialect.decimal
     at_mark = dialect.numeric[-1] and mark != dialect.delimiter
     at_mark = at_mark and body[-1].endswith(mark) and not any(text.endswith(mark) for text in body[:-1])
-    if at_mark or (last is not None and len(others) == 1 and last < (others.pop() or 0)):
+    unclosed = body[-1].count('"') % 2 == 1 and not any(text.count('"') % 2 for text in body[:-1])
+    if at_mark or unclosed or (last is not None and len(others) == 1 and last < (others.pop() or 0)):
         raise ReadError.at(
             f"{path}, line {numbers[-1]}",
-            "the file ends within a number, for its last line has no line end and fewer decimals than the others",
+            "the file ends within a number, for its last line has no line end and is shorter than the others",
             "copy the log again, or remove its last line",
         )
 
