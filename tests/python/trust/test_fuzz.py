@@ -108,6 +108,16 @@ def test_a_last_line_that_ends_at_the_decimal_mark(tmp_path: Path, monkeypatch: 
             ga.read(path, dt=1e-3)
 
 
+def test_commas_between_quotation_marks_have_one_meaning(tmp_path: Path) -> None:
+    """A title of one cell above two columns was taken for one name of two."""
+    path = tmp_path / "log.csv"
+    path.write_text("Log of a drive\n" + "\n".join(f'"{-k}","{k}"' for k in range(40)) + "\n")
+    assert ga.read(path, {"velocity": "#0", "torque": "#1"}, dt=1e-3).velocity[-1] == -39.0
+    path.write_text(path.read_text().replace('"', ""))
+    with pytest.raises(ga.GaidentError, match="commas stand between the columns and, it seems, inside the numbers too"):
+        ga.read(path, {"velocity": "#0", "torque": "#1"}, dt=1e-3)
+
+
 def test_a_last_line_whose_quotation_mark_is_missing(tmp_path: Path) -> None:
     rows = [f'"{k}","{k / 7!r}"' for k in range(40)]
     path = tmp_path / "log.csv"

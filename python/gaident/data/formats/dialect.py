@@ -151,8 +151,8 @@ def _refuse_two_meanings(path: str, lines: Sequence[Line], half: Sequence[Line],
     """`0,001,1,5`: is that four whole numbers or two with decimal commas? Then only the user knows."""
     rows = [(number, split(text, ",")) for number, text in half[:: max(1, len(half) // POLICY.sampled_lines)]]
     whole = [(number, row) for number, row in rows if all(cell.lstrip("+-").isdigit() for cell in row)]
-    if len(whole) < POLICY.whole_rows * len(rows):
-        return
+    if len(whole) < POLICY.whole_rows * len(rows) or all(text.count('"') >= 2 * found.width for _, text in half):
+        return  # in quotation marks, a comma is what it is
     names = next((split(text, ",") for _, text in reversed(lines[: len(lines) // 2]) if not _digits_only(text)), [])
     suspicious = [number for number, row in whole if any(_LEADING_ZERO.fullmatch(cell) for cell in row[1:])]
     other_widths = [number for number, row in whole if len(row) != found.width]
