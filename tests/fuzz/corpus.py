@@ -36,7 +36,7 @@ class Seed:
 
 def seeds(forms: Sequence[str] = ()) -> list[Seed]:
     """Every seed, in an order that does not change, or those of some formats."""
-    found = [*_text(), *_binary(), *_sinumerik(), *_saved(), *_responses()]
+    found = [*_text(), *_binary(), *_sinumerik(), *_saved(), *_responses(), *_drive()]
     for form, ending, make, weight in [row for row in _FOREIGN if not forms or row[0] in forms]:
         with suppress(ImportError):  # what is not installed cannot be read
             found += [Seed(form, ending, content, weight) for content in make()]
@@ -116,6 +116,12 @@ def _saved() -> Iterator[Seed]:
 def _responses() -> Iterator[Seed]:
     rows = "\n".join(f"{f:g},{20 - 0.1 * f:g},{-f:g}" for f in range(1, 200, 4))
     yield Seed("response", ".csv", f"frequency [Hz],magnitude [dB],phase [deg]\n{rows}\n".encode())
+
+
+def _drive() -> Iterator[Seed]:
+    content = (ROOT / "examples" / "drive.toml").read_bytes()
+    yield Seed("drive", ".toml", content)
+    yield Seed("drive", ".toml", content + b"\n[axes.x]\ngear_ratio = 5.0\n[axes.y]\n")
 
 
 # ---- formats of libraries, each through a file

@@ -59,7 +59,7 @@ class Inputs:
         """(the seed, the damaged content, the ending of its name)."""
         draw = np.random.default_rng([self.seed, number])
         seed = self.corpus[int(draw.choice(len(self.corpus), p=self.chances))]
-        text = seed.form in ("text", "SINUMERIK", "saved", "response")
+        text = seed.form in ("text", "SINUMERIK", "saved", "response", "drive")
         whole = seed.form == "saved" and draw.random() < 0.7
         content = odd_json(seed.content, draw) if whole else damaged(seed.content, draw, self.of_form[seed.form], text)
         ending = seed.ending if draw.random() < 0.9 else str(draw.choice([".csv", ".bin", ".mat", ".npz", ""]))
@@ -69,6 +69,7 @@ class Inputs:
 def calls_of(form: str, number: int) -> list[Callable[[str], Any]]:
     """What is done with a file."""
     import gaident as ga
+    from gaident.drive.drive_file import axes_in, read_drive_file
 
     def shown(path: str) -> str:
         found = ga.load(path)
@@ -76,6 +77,8 @@ def calls_of(form: str, number: int) -> list[Callable[[str], Any]]:
 
     if form == "saved":
         return [shown]
+    if form == "drive":
+        return [read_drive_file, axes_in, lambda path: read_drive_file(path, "x")]
     if form == "response":
         return [ga.read_response]
     named: Any = {"time": None, "velocity": "velocity", "torque": "torque"}
@@ -241,7 +244,7 @@ def main() -> int:
     parser.add_argument("--seed", type=int, default=1, help="another seed makes other inputs (%(default)s)")
     parser.add_argument("--workers", type=int, default=os.cpu_count() or 1, help="processes (%(default)s)")
     parser.add_argument(
-        "--forms", nargs="+", default=[], help="formats: text MAT NPZ SINUMERIK saved response HDF5 MDF Parquet TDMS"
+        "--forms", nargs="+", default=[], help="formats: text MAT NPZ SINUMERIK saved response drive HDF5 MDF Parquet TDMS"
     )
     parser.add_argument("--only", type=int, metavar="NUMBER", help="one input, with the traceback of what is wrong with it")
     parser.add_argument("--worker", action="store_true", help=argparse.SUPPRESS)

@@ -26,7 +26,13 @@ def ran(script: str, *arguments: str) -> subprocess.CompletedProcess[str]:
 
 def test_damaged_files_are_read_or_refused() -> None:
     done = ran(
-        "run.py", "--inputs", "300", "--workers", "1", "--forms", *("text", "MAT", "NPZ", "SINUMERIK", "saved", "response")
+        "run.py",
+        "--inputs",
+        "300",
+        "--workers",
+        "1",
+        "--forms",
+        *("text", "MAT", "NPZ", "SINUMERIK", "saved", "response", "drive"),
     )
     assert done.returncode == 0 and "300 inputs of seed 1" in done.stdout and ": 0 flawed" in done.stdout, (
         done.stdout + done.stderr
