@@ -14,7 +14,8 @@ import pytest
 
 import gaident as ga
 from gaident.data.formats import delimited
-from places import GOLDEN, ROOT
+from gaident.show.diagnosis_summary import DRIVERS
+from places import GOLDEN, PACKAGE, ROOT
 
 FUZZ = ROOT / "tests" / "fuzz"
 
@@ -91,6 +92,20 @@ def test_a_pair_of_roots_without_one_of_its_numbers_is_refused() -> None:
         del other["parameters"][name]
         with pytest.raises(ga.GaidentError, match=f"parameters lacks {name}"):
             ga.Identification.from_dict(other)
+
+
+def test_what_is_left_depends_on_a_signal_that_has_words(tmp_path: Path) -> None:
+    """A saved diagnosis whose driver was another text was loaded, and its summary failed with KeyError."""
+    schema = json.loads((PACKAGE / "results" / "results.schema.json").read_text())
+    known = schema["$defs"]["diagnosis"]["properties"]["driver"]["anyOf"][0]["enum"]
+    assert known == list(DRIVERS)
+    data = json.loads((GOLDEN / "saved_0_1" / "diagnosis.json").read_text())
+    path = tmp_path / "dia.json"
+    path.write_text(json.dumps(data | {"driver": known[0]}))
+    assert ga.load(path).summary()
+    path.write_text(json.dumps(data | {"driver": "nan"}))
+    with pytest.raises(ga.GaidentError, match="driver is 'nan', which is none of 'velocity'"):
+        ga.load(path)
 
 
 def test_a_word_between_decimal_commas_and_blanks(tmp_path: Path) -> None:

@@ -26,6 +26,7 @@ WHOLE = 1 << 25  # no decision: memory; bytes
 """Bytes of a text that is kept in memory as it is; longer ones are read block by block."""
 
 _HEAD = 1 << 18  # no decision: memory; bytes
+_CHARACTER = 4  # no decision: a format: bytes of the widest character
 _MAY_BE_CUT = (
     "The file's last line has no line end, so that its last number may be cut, which numbers of this form do not show: compare "
     "it with the drive's, or leave the line out."
@@ -138,7 +139,8 @@ def open_text(path: str, file: Path, options: TextOptions) -> LogTable:
 def _end(file: Path, encoding: str) -> list[str]:
     """The last lines of a long file whose last line has no line end; none where it has one."""
     with open(file, "rb") as stream:
-        stream.seek(os.path.getsize(file) // 4 * 4 - min(_HEAD, os.path.getsize(file) // 4 * 4))  # at a whole character
+        # At a whole character, of those that have one width.
+        stream.seek(max(0, os.path.getsize(file) // _CHARACTER * _CHARACTER - _HEAD))
         raw = stream.read()
     plain = {"utf-16": "utf-16-le", "utf-32": "utf-32-le"}.get(encoding, encoding)
     text = raw.decode(plain, errors="replace").rstrip("\x1a").replace("\r\n", "\n").replace("\r", "\n")
