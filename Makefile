@@ -35,7 +35,7 @@ SOURCES := pyproject.toml CMakeLists.txt LICENSE README.md \
 ifndef SIDE_BY_SIDE
 .NOTPARALLEL:
 endif
-.PHONY: help install demo test bench real embedded wheel windows tidy docs lint test-cpp test-python clean build-checked test-checked test-sanitized
+.PHONY: help install demo test fuzz bench real embedded wheel windows tidy docs lint test-cpp test-python clean build-checked test-checked test-sanitized
 .DEFAULT_GOAL := help
 
 help: ## list the commands
@@ -73,6 +73,10 @@ test-sanitized: .venv/.tools ## the C++ tests again under AddressSanitizer and U
 
 test-python: .venv/.tested
 	$(BIN)/python -m pytest -n $(JOBS) --dist worksteal
+
+fuzz: .venv/.tested ## damaged files of every format and tables with known values, some minutes (docs/trust.md); FUZZ_FLAGS, ORACLE_FLAGS
+	$(BIN)/python tests/fuzz/run.py --workers $(JOBS) $(FUZZ_FLAGS)
+	$(BIN)/python tests/fuzz/oracle.py --workers $(JOBS) $(ORACLE_FLAGS)
 
 bench: .venv/.tools ## build (plainly, without Python) and run the C++ benchmark; BENCH_FLAGS=... goes to it
 	@mkdir -p build/plain

@@ -1,4 +1,4 @@
-"""Files that appear whole or not at all, and locks.
+"""Files that appear whole or not at all, locks, and the streams and limits of a process.
 
 The only module that calls what Windows has not, or has otherwise.
 There a file that is open cannot be removed or replaced, so that no lock has to say that it is in use.
@@ -15,6 +15,7 @@ import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import BinaryIO
 
 from gaident.checks import checked_path
 
@@ -22,8 +23,9 @@ if sys.platform == "win32":
     import msvcrt
 else:
     import fcntl
+    import resource
 
-__all__ = ["check_writable", "lock_alone", "write_whole"]
+__all__ = ["check_writable", "detached_streams", "limit_memory", "limit_seconds", "lock_alone", "write_whole"]
 
 _PREFIX, _SUFFIX = ".gaident-", ".part"
 _BINARY: int = getattr(os, "O_BINARY", 0)  # no decision: Windows, where ends of lines are changed without it
@@ -43,6 +45,38 @@ def lock_alone(descriptor: int) -> None:
             raise BlockingIOError(errno.EWOULDBLOCK, "another process has locked the file") from error
     else:
         fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+
+
+def detached_streams() -> tuple[BinaryIO, BinaryIO]:
+    """Return what this process is asked and where it answers; its usual streams lead nowhere from here on."""
+    questions, answers = os.dup(0), os.dup(1)
+    nowhere = os.open(os.devnull, os.O_RDWR)
+    for usual in (0, 1, 2):
+        os.dup2(nowhere, usual)
+    os.close(nowhere)
+    if sys.platform == "win32":
+        msvcrt.setmode(questions, os.O_BINARY)
+        msvcrt.setmode(answers, os.O_BINARY)
+        msvcrt.SetErrorMode(msvcrt.SEM_FAILCRITICALERRORS | msvcrt.SEM_NOGPFAULTERRORBOX)  # no window at a crash
+    return os.fdopen(questions, "rb"), os.fdopen(answers, "wb")
+
+
+def limit_memory(room: int) -> None:
+    """Let this process take `room` bytes more, and leave no file of its memory at a crash; where the system has such limits."""
+    if sys.platform != "win32":
+        resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+        with contextlib.suppress(OSError, ValueError):  # where a system does not say what is taken, or keeps no such limit
+            pages = int(Path("/proc/self/statm").read_text(encoding="ascii").split()[0])
+            hard = resource.getrlimit(resource.RLIMIT_AS)[1]
+            resource.setrlimit(resource.RLIMIT_AS, (pages * resource.getpagesize() + room, hard))
+
+
+def limit_seconds(seconds: float) -> None:
+    """Let this process end at so many seconds of processor time; only where the system has such limits."""
+    if sys.platform != "win32":
+        with contextlib.suppress(OSError, ValueError):
+            hard = resource.getrlimit(resource.RLIMIT_CPU)[1]
+            resource.setrlimit(resource.RLIMIT_CPU, (int(seconds) + 1, hard))
 
 
 def write_whole(path: str | os.PathLike[str], content: bytes) -> None:

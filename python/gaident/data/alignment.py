@@ -164,6 +164,7 @@ def align(
     first, second = _common(mine, theirs, on)
     limit = positive_number(max_rate, "max_rate", "", "give for example 1e-3")
     x, y = mine[first], theirs[second]
+    _check_lengths(len(x) * rec.dt, rec.dt, len(y) * their_dt, their_dt)
     for values, whose, name in ((x, "rec", first), (y, "other", second)):
         if np.ptp(values) == 0.0:
             raise RecordError(f"{whose}'s {name} is constant: there is no motion to align by; give on= with another channel")
@@ -236,6 +237,15 @@ def _check_wishes(mine: float, theirs: float, take: object, within: object, max_
             raise RecordError(f"within is {within!r:.80}: {remedy}")
     if not positive_number(max_rate, "max_rate", "", "give for example 1e-3") <= FASTEST_RATE:
         raise RecordError(f"max_rate is {max_rate!r}: give at most {FASTEST_RATE:g}, for example 1e-3")
+
+
+def _check_lengths(mine: float, dt: float, theirs: float, their_dt: float) -> None:
+    """Raises RecordError for logs of so many seconds, the shorter of which is no more than a few samples of the slower."""
+    if min(mine, theirs) < MINIMUM_SAMPLES * max(dt, their_dt):
+        raise RecordError(
+            f"rec lasts {mine:g} s at dt={dt:g} s and other {theirs:g} s at dt={their_dt:g} s: the shorter log must last "
+            f"{MINIMUM_SAMPLES} samples of the slower one; check the sample times, or give longer logs"
+        )
 
 
 def _best(

@@ -61,7 +61,7 @@ def assemble(table: LogTable, wanted: Wanted, stem: str) -> Record:
         dt, values = _on_even_axis(table, wanted, named, scales, counters)
     else:
         dt, values = _block_by_block(table, wanted, named, scales, counters)
-    said += _slow_clock(table, wanted, named, dt)
+    said += [*_slow_clock(table, wanted, named, dt), *dict.fromkeys(column.note for column in named.values() if column.note)]
     try:
         if "velocity" not in values and "position" not in values:
             values["velocity"] = np.zeros(len(next(iter(values.values()))))

@@ -17,9 +17,8 @@ from gaident.arguments import arg
 from gaident.data.assemble import assemble
 from gaident.data.formats.binary import read_mat, read_npz
 from gaident.data.formats.delimited import TextOptions, open_text
-from gaident.data.formats.frames import frame_table, is_frame, open_parquet
-from gaident.data.formats.hdf import open_hdf
-from gaident.data.formats.instruments import open_mdf, open_tdms
+from gaident.data.formats.foreign.apart import open_apart
+from gaident.data.formats.frames import frame_table, is_frame
 from gaident.data.formats.sinumerik import open_sinumerik
 from gaident.data.formats.table import Column, LogTable
 from gaident.data.formats.time_names import time_and_unit
@@ -46,13 +45,18 @@ class Reader:
     open: Callable[[str, Path, TextOptions, ExitStack], LogTable]
 
 
+def _apart(form: str) -> Callable[[str, Path, TextOptions, ExitStack], LogTable]:
+    """What opens a format in a process of its own."""
+    return lambda path, file, _, stack: open_apart(form, path, file, stack)
+
+
 READERS = (
-    Reader("MAT 7.3", (), (b"MATLAB 7.3",), lambda path, file, _, stack: open_hdf(path, file, stack)),
+    Reader("MAT 7.3", (), (b"MATLAB 7.3",), _apart("HDF5")),
     Reader("MAT", (".mat",), (b"MATLAB 5.0",), lambda path, file, *_: read_mat(path, file.read_bytes())),
-    Reader("HDF5", (".h5", ".hdf5", ".hdf", ".he5"), (b"\x89HDF",), lambda path, file, _, stack: open_hdf(path, file, stack)),
-    Reader("Parquet", (".parquet", ".pq"), (b"PAR1",), lambda path, file, _, stack: open_parquet(path, file, stack)),
-    Reader("TDMS", (".tdms",), (b"TDSm",), lambda path, file, _, stack: open_tdms(path, file, stack)),
-    Reader("MDF", (".mf4", ".mdf"), (b"MDF ", b"UnFinMF"), lambda path, file, _, stack: open_mdf(path, file, stack)),
+    Reader("HDF5", (".h5", ".hdf5", ".hdf", ".he5"), (b"\x89HDF",), _apart("HDF5")),
+    Reader("Parquet", (".parquet", ".pq"), (b"PAR1",), _apart("Parquet")),
+    Reader("TDMS", (".tdms",), (b"TDSm",), _apart("TDMS")),
+    Reader("MDF", (".mf4", ".mdf"), (b"MDF ", b"UnFinMF"), _apart("MDF")),
     Reader("SINUMERIK trace", (".xml",), (b"<?xml", b"\xef\xbb\xbf<?xml", b"<traceSession"), open_sinumerik),
     Reader("NPZ", (".npz",), (), lambda path, file, *_: read_npz(path, file.read_bytes())),
     Reader(

@@ -73,7 +73,10 @@ class TimeAxis:
         # The mean is free of the rounding that the median keeps; 12 digits drop the noise of the division.
         steps = self.count - 1
         mean = (self.last - self.start) / steps
-        return float(f"{_of_few_digits(mean, sum(self.ends) / steps) * self.second:.12g}")
+        mean = _of_few_digits(mean, sum(self.ends) / steps)
+        # A stamp since 1970 in seconds is a double to 0.2 us.
+        mean = _of_few_digits(mean, float(np.spacing(abs(self.start)) + np.spacing(abs(self.last))) / steps)
+        return float(f"{mean * self.second:.12g}")
 
     def _check_rows(self, table: LogTable, t: NDArray[np.float64], shift: int) -> None:
         """Each step is one sample, whatever the clock's jitter: raises ReadError for rows that are lost or there twice."""

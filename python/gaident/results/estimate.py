@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Collection
 from dataclasses import dataclass, replace
 
 from gaident.axis import unit
+from gaident.errors import GaidentError
 
-__all__ = ["ANGULAR", "Estimate", "of_axis"]
+__all__ = ["ANGULAR", "Estimate", "check_complete", "of_axis"]
 
 ANGULAR = frozenset({"phase", "frequency", "zero_frequency", "bandwidth"})
 """Parameters of effects that are an angle within a period or an angular frequency: in rad and rad/s on a linear axis too."""
@@ -48,6 +50,15 @@ class Estimate:
     at_bound: bool = False
     identifiable: bool = True
     of_controller: float = 0.0
+
+
+def check_complete(names: Collection[str]) -> None:
+    """Raise GaidentError where the saved parameters of a model lack one: its gain, or one of the four of a pair of roots."""
+    pairs = {name.rsplit("_", 1)[0] for name in names if "_pair_" in name}
+    needed = ["gain", *(f"{pair}_{what}" for pair in sorted(pairs) for what in ("real", "imaginary", "frequency", "damping"))]
+    missing = next((name for name in needed if name not in names), None)
+    if missing is not None:
+        raise GaidentError(f"parameters lacks {missing}, which a model with these others has; save it again")
 
 
 def of_axis(name: str, estimate: Estimate, axis: str) -> Estimate:

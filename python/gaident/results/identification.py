@@ -24,7 +24,7 @@ from gaident.models.simulate import initial_state, simulate
 from gaident.models.starts import starts_moving
 from gaident.providers import picture, provided
 from gaident.results.adequacy import Adequacy
-from gaident.results.estimate import Estimate
+from gaident.results.estimate import Estimate, check_complete
 from gaident.results.saved import SavedResult, given_record, rows_of, undamaged
 from gaident.results.settings import Settings
 from gaident.results.structures import Rival, Structure, TrialOutcome
@@ -365,8 +365,7 @@ class Identification(SavedResult):
         """
         check_schema(data, SCHEMA, SCHEMA_VERSION)
         with undamaged(cls.KIND):
-            if "gain" not in data["parameters"]:
-                raise GaidentError("parameters lacks gain, which every model has; save it again")
+            check_complete(data["parameters"])
             return cls(
                 model=Model.from_dict(data["model"]),
                 controller=None if data["controller"] is None else controller_of(data["controller"]),

@@ -6,7 +6,6 @@ import datetime
 import tracemalloc
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -14,7 +13,6 @@ import pytest
 import gaident as ga
 from gaident.data import read, read_columns
 from gaident.data.formats import delimited
-from gaident.data.formats import stored as stored_module
 from gaident.data.signals.resampling import resampled
 from gaident.data.timeaxis import even_step
 from gaident.errors import ReadError, RecordError
@@ -217,10 +215,9 @@ def test_formats_of_other_libraries(
     with pytest.raises(ReadError, match=r"damaged\."):
         read(damaged, columns=columns)
 
-    def absent(name: str) -> Any:
-        raise ImportError(f"No module named {name!r}")
-
-    monkeypatch.setattr(stored_module.importlib, "import_module", absent)
+    for name in ("h5py", "pyarrow", "nptdms", "asammdf"):
+        (tmp_path / f"{name}.py").write_text(f"raise ImportError('no {name}')")
+    monkeypatch.syspath_prepend(tmp_path)
     with pytest.raises(ReadError, match=r'log\.bin: this is .* needs the library \w+.*pip install "gaident\[\w+\]"'):
         read(without_name, columns=columns)
 

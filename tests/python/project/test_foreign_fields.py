@@ -26,10 +26,11 @@ ALLOWED = {
         {"action.complete", "action.choices[short.dest].description"},
         "shtab reads how an option is completed from a field of the parser's option",
     ),
-    "data/formats/instruments": (
-        {"sys.unraisablehook", "error.__traceback__"},
-        "the interpreter's hook, put back at once, and the frames of an error that was caught",
+    "data/formats/foreign/child": (
+        {"os.cpu_count", "sys.modules['pandas']"},
+        "a process of our own, whose libraries start a thread for each processor else, and import what they do not need",
     ),
+    "data/formats/foreign/mdf": ({"channel.conversion"}, "asammdf applies what stands there, whatever it is asked"),
     "data/signals/arrays": ({"copy.flags.writeable"}, "NumPy: how an array is made read-only"),
     "data/frequency/response": ({"copy.flags.writeable"}, "the same"),
     "data/signals/decimation": ({"taps.flags.writeable"}, "the same"),

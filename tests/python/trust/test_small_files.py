@@ -89,7 +89,17 @@ def hdf(path: Path) -> None:
             file.create_dataset(name, shape=(500_000_000,), dtype="f8", chunks=(1_000_000,), fillvalue=1.0)
 
 
-@pytest.mark.parametrize("make", [npz, mat, hdf])
+def parquet(path: Path) -> None:
+    """Two columns of 40 million equal numbers each, 320 MB, in 100 kB."""
+    pyarrow = pytest.importorskip("pyarrow")
+    files = pytest.importorskip("pyarrow.parquet")
+    part = pyarrow.table({name: np.zeros(1_000_000) for name in ("torque", "velocity")})
+    with files.ParquetWriter(path, part.schema) as writer:
+        for _ in range(40):
+            writer.write_table(part)
+
+
+@pytest.mark.parametrize("make", [npz, mat, hdf, parquet])
 def test_a_file_that_unpacks_to_gigabytes_is_refused(make: Callable[[Path], None], tmp_path: Path) -> None:
     path, plain = tmp_path / f"log.{make.__name__.replace('hdf', 'h5')}", tmp_path / "plain.csv"
     make(path)

@@ -14,7 +14,7 @@ from gaident.arguments import arg
 from gaident.data.formats.cells import ROWS, numbers_of
 from gaident.data.formats.dialect import Dialect, detect
 from gaident.data.formats.exports import END_MARK, refined, scope_layout
-from gaident.data.formats.faults import Thousands, refuse_cut_line
+from gaident.data.formats.faults import Thousands, cut_unseen, refuse_cut_line
 from gaident.data.formats.header import COMMENT, Header, find_header
 from gaident.data.formats.table import Column, LogTable, first_line
 from gaident.data.formats.text import Line, check_text, encoding_of, lines_of
@@ -26,6 +26,11 @@ WHOLE = 1 << 25  # no decision: memory; bytes
 """Bytes of a text that is kept in memory as it is; longer ones are read block by block."""
 
 _HEAD = 1 << 18  # no decision: memory; bytes
+_CHARACTER = 4  # no decision: a format: bytes of the widest character
+_MAY_BE_CUT = (
+    "The file's last line has no line end, so that its last number may be cut, which numbers of this form do not show: compare "
+    "it with the drive's, or leave the line out."
+)
 _WORDS = {"tab": "\t", "space": " ", "comma": ",", "semicolon": ";", "pipe": "|", "\\t": "\t"}
 
 
@@ -101,7 +106,10 @@ def open_text(path: str, file: Path, options: TextOptions) -> LogTable:
         Thousands(path, layout.dialect, options.decimal is not None).push(numbers, body)
         if everything[-1]:
             refuse_cut_line(path, numbers, body, layout.dialect)
-        return layout.table(path, numbers, body)
+        table = layout.table(path, numbers, body)
+        if everything[-1] and not layout.trailing and cut_unseen(body, layout.dialect):
+            table = replace(table, columns=(*table.columns[:-1], replace(table.columns[-1], note=_MAY_BE_CUT)))
+        return table
     with open(file, "rb") as stream:
         head = stream.read(_HEAD)
     encoding = encoding_of(head[: head.rfind(b"\n") + 1] or head, options.encoding)
@@ -112,15 +120,31 @@ def open_text(path: str, file: Path, options: TextOptions) -> LogTable:
     def batches(columns: Sequence[Column]) -> Iterator[LogTable]:
         keys = {column.key for column in columns}
         thousands = Thousands(path, layout.dialect, options.decimal is not None)
+        before: list[str] = []
         for numbers, body, ended in _blocks(path, file, encoding, layout.start):
             thousands.push(numbers, body)
             if not ended:
-                refuse_cut_line(path, numbers, body, layout.dialect)
+                refuse_cut_line(path, numbers, [*before, *body], layout.dialect)
+            before = body
             block = layout.table(path, numbers, body)
             yield replace(block, columns=tuple(column for column in block.columns if column.key in keys))
 
-    empty = tuple(replace(column, values=column.whole()[:0], bad=None) for column in sample.columns)
-    return replace(sample, columns=empty, lines=None, batches=batches)
+    empty = [replace(column, values=column.whole()[:0], bad=None) for column in sample.columns]
+    end = _end(file, encoding)
+    if end and not layout.trailing and cut_unseen(end, layout.dialect):
+        empty[-1] = replace(empty[-1], note=_MAY_BE_CUT)
+    return replace(sample, columns=tuple(empty), lines=None, batches=batches)
+
+
+def _end(file: Path, encoding: str) -> list[str]:
+    """The last lines of a long file whose last line has no line end; none where it has one."""
+    with open(file, "rb") as stream:
+        # At a whole character, of those that have one width.
+        stream.seek(max(0, os.path.getsize(file) // _CHARACTER * _CHARACTER - _HEAD))
+        raw = stream.read()
+    plain = {"utf-16": "utf-16-le", "utf-32": "utf-32-le"}.get(encoding, encoding)
+    text = raw.decode(plain, errors="replace").rstrip("\x1a").replace("\r\n", "\n").replace("\r", "\n")
+    return [] if text.endswith("\n") else text.split("\n")[1:]
 
 
 def _without_tail(columns: Sequence[Column]) -> list[Column]:

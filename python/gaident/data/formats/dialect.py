@@ -83,7 +83,7 @@ def detect(path: str, lines: Sequence[Line], delimiter: str | None, decimal: str
     half = lines[len(lines) // 2 :]
     sample = [text for _, text in half[:: max(1, len(half) // POLICY.sampled_lines)]]
     best: Dialect | None = None
-    best_score = (0.0, 0.0)
+    best_score = (0.0, 0.0, 0.0)
     for mark in _DELIMITERS if delimiter is None else (delimiter,):
         rows = [split(text, mark) for text in sample]
         for point in (".", ",") if decimal is None else (decimal,):
@@ -107,26 +107,33 @@ def detect(path: str, lines: Sequence[Line], delimiter: str | None, decimal: str
     return best
 
 
-def _weigh(rows: list[list[str]], delimiter: str, decimal: str) -> tuple[Dialect, tuple[float, float]]:
-    """A candidate, and (numeric cells per line, minus text cells per line): the larger the better."""
+def _weigh(rows: list[list[str]], delimiter: str, decimal: str) -> tuple[Dialect, tuple[float, float, float]]:
+    """A candidate, and (numeric cells, minus text cells, minus those between numbers, each per line): the larger the better."""
     width = Counter(len(row) for row in rows).most_common(1)[0][0]
     # no decision: a format: comma is not the delimiter where another mark is
     others = [mark for mark in _DELIMITERS[:3] if mark != delimiter]
     table = [row for row in rows if len(row) == width]
     pattern = _NUMBER[decimal]
     numeric = []
-    numbers = texts = 0
+    numbers = texts = between = 0
     for column in zip(*table, strict=True):
         filled = [cell for cell in column if cell]
         good = sum(len(cell) <= LONGEST_NUMBER and pattern.fullmatch(cell) is not None for cell in filled)
         numeric.append(2 * good > len(filled))
         numbers += good
         texts += len(filled) - good
+        between += sum(map(_text_between_numbers, filled)) if not numeric[-1] else 0
         # Text with a separator in it was cut at the wrong one.
         if not numeric[-1] and any(mark in cell for cell in filled for mark in others):
-            return Dialect(delimiter, decimal, ()), (0.0, 0.0)
+            return Dialect(delimiter, decimal, ()), (0.0, 0.0, 0.0)
     empty = width > 1 and not any(row[-1] for row in table)
-    return Dialect(delimiter, decimal, tuple(numeric), empty), (numbers / len(rows), -texts / len(rows))
+    return Dialect(delimiter, decimal, tuple(numeric), empty), (numbers / len(rows), -texts / len(rows), -between / len(rows))
+
+
+def _text_between_numbers(cell: str) -> bool:
+    """`30,0 on 10,5` that is cut at its commas leaves `0 on 10`."""
+    words = cell.split()
+    return len(words) > 2 and parse_number(words[0], ".") is not None and parse_number(words[-1], ".") is not None
 
 
 def _look_further(lines: Sequence[Line], found: Dialect) -> Dialect:
@@ -144,8 +151,8 @@ def _refuse_two_meanings(path: str, lines: Sequence[Line], half: Sequence[Line],
     """`0,001,1,5`: is that four whole numbers or two with decimal commas? Then only the user knows."""
     rows = [(number, split(text, ",")) for number, text in half[:: max(1, len(half) // POLICY.sampled_lines)]]
     whole = [(number, row) for number, row in rows if all(cell.lstrip("+-").isdigit() for cell in row)]
-    if len(whole) < POLICY.whole_rows * len(rows):
-        return
+    if len(whole) < POLICY.whole_rows * len(rows) or all(text.count('"') >= 2 * found.width for _, text in half):
+        return  # in quotation marks, a comma is what it is
     names = next((split(text, ",") for _, text in reversed(lines[: len(lines) // 2]) if not _digits_only(text)), [])
     suspicious = [number for number, row in whole if any(_LEADING_ZERO.fullmatch(cell) for cell in row[1:])]
     other_widths = [number for number, row in whole if len(row) != found.width]

@@ -9,7 +9,7 @@ from gaident.arguments import arg
 from gaident.data.formats.dialect import Dialect, parse_number, split
 from gaident.errors import ReadError
 
-__all__ = ["Thousands", "refuse_cut_line"]
+__all__ = ["Thousands", "cut_unseen", "refuse_cut_line"]
 
 _SHORT = re.compile(r"[+-]?\d{1,3}")
 _GROUPS = {mark: re.compile(rf"[+-]?[1-9]\d{{0,2}}(?:{re.escape(mark)}\d{{3}})+") for mark in ".,"}
@@ -68,17 +68,32 @@ class Thousands:
 def refuse_cut_line(path: str, numbers: Sequence[int], body: Sequence[str], dialect: Dialect) -> None:
     """Raises ReadError where the last of these lines, which has no line end, is cut within its last number.
 
-    That shows where the column is printed with one number of characters behind the decimal mark, and fewer stand there.
+    That shows where it ends with the decimal mark, lacks a quotation mark, or has fewer decimals than all other lines.
     Of whole numbers, and of numbers printed with as many digits as they need, it does not show.
     """
     last = _tail(body[-1], dialect)
     others = {_tail(text, dialect) for text in body[:-1]} if last is not None else set()
-    if last is not None and len(others) == 1 and last < (others.pop() or 0):
+    mark = dialect.decimal
+    at_mark = dialect.numeric[-1] and mark != dialect.delimiter
+    at_mark = at_mark and body[-1].endswith(mark) and not any(text.endswith(mark) for text in body[:-1])
+    unclosed = body[-1].count('"') % 2 == 1 and not any(text.count('"') % 2 for text in body[:-1])
+    if at_mark or unclosed or (last is not None and len(others) == 1 and last < (others.pop() or 0)):
         raise ReadError.at(
             f"{path}, line {numbers[-1]}",
-            "the file ends within a number, for its last line has no line end and fewer decimals than the others",
+            "the file ends within a number, for its last line has no line end and is shorter than the others",
             "copy the log again, or remove its last line",
         )
+
+
+def cut_unseen(body: Sequence[str], dialect: Dialect) -> bool:
+    """Whether the last of these lines, which has no line end, may be cut within its last number, and nothing shows it.
+
+    That is so of whole numbers, and of numbers printed with as many digits as they need, where others are longer than the last.
+    """
+    tails = [_tail(text, dialect) for text in body]
+    lengths = [len(split(text, dialect.delimiter)[-1]) for text, tail in zip(body, tails, strict=True) if tail is not None]
+    found = set(tails) - {None}
+    return tails[-1] is not None and (len(found) > 1 or found == {0}) and lengths[-1] < max(lengths)
 
 
 def _tail(text: str, dialect: Dialect) -> int | None:

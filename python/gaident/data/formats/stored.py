@@ -11,11 +11,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gaident.data.formats.table import Column, LogTable, Stored
+from gaident.data.formats.table import Column, LogTable, Stored, first_line
 from gaident.data.formats.unit_names import unit_of
 from gaident.errors import ReadError
 
-__all__ = ["Matrix", "array_table", "check_unpacked", "library", "midnight", "seconds_since", "unique_keys"]
+__all__ = ["Matrix", "array_table", "channel_table", "check_unpacked", "library", "midnight", "seconds_since", "unique_keys"]
 
 _LISTED_COLUMNS = 1000  # no decision: how many columns are listed
 MOST_UNPACKED = 1 << 28  # no decision: memory: bytes that a file may unpack to whatever its size
@@ -65,6 +65,14 @@ def array_table(
     return LogTable(path, tuple(columns), matrices=matrices, others=tuple(others), form=form)
 
 
+def channel_table(path: str, columns: list[Column], others: list[str], form: str) -> LogTable:
+    """The table of a logger's channels. Raises ReadError where there are none."""
+    if not columns:
+        rest = f" (only {', '.join(others)})" if others else ""
+        raise ReadError(f"{path}: the file contains no channels of numbers{rest}; give a log with measured channels")
+    return LogTable(path, tuple(columns), others=tuple(others), form=form)
+
+
 def _last_part(name: str) -> tuple[str, ...]:
     """`log/speed` and `log.speed` also answer to `speed`."""
     last = name.replace(".", "/").rsplit("/", 1)[-1]
@@ -92,9 +100,9 @@ def library(module: str, extra: str, path: str, what: str) -> Any:
     name = module.split(".")[0]
     try:
         found = importlib.import_module(module)
-    except ImportError as error:
+    except Exception as error:  # one that does not suit the others fails otherwise than by ImportError
         raise ReadError(
-            f"{path}: this is {what}, and reading it needs the library {name}, which cannot be imported ({error}); "
+            f"{path}: this is {what}, and reading it needs the library {name}, which cannot be imported ({first_line(error)}); "
             f'install it with pip install "gaident[{extra}]"'
         ) from None
     # What it has to say comes as an error of ours, not as lines of its loggers beside it.

@@ -46,6 +46,13 @@ class Stored:
         start, stop, _ = rows.indices(self.length)
         try:
             values = self.read(start, stop)
+        except ReadError:
+            raise
+        except MemoryError:
+            raise ReadError(
+                f"{self.path}: reading rows {start} to {stop - 1} takes more memory than there is; copy the file again, or save "
+                "the log in parts"
+            ) from None
         except Exception as error:  # every library has its own
             raise ReadError(
                 f"{self.path}: damaged, rows {start} to {stop - 1} cannot be read ({first_line(error)}); copy the file again"
@@ -68,6 +75,7 @@ class Column:
     bad      (row, text) of the first cell that is no number, None if all are
     clock    key of the column with its time stamps, where the file says which
     period   sample time [s], where the file states it
+    note     what the record's notes say of it, "" if nothing
     """
 
     key: str
@@ -77,6 +85,7 @@ class Column:
     bad: tuple[int, str] | None = None
     clock: str | None = None
     period: float | None = None
+    note: str = ""
 
     def whole(self) -> NDArray[Any]:
         """All values, read if they are still in the file."""

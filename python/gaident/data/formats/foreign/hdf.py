@@ -1,4 +1,4 @@
-"""Readers for HDF5 and for MAT of version 7.3, which is HDF5 inside; nothing is read before it is asked for."""
+"""Reader for HDF5 and for MAT of version 7.3, which is HDF5 inside; nothing is read before it is asked for."""
 
 from __future__ import annotations
 
@@ -15,6 +15,7 @@ from gaident.errors import ReadError
 
 __all__ = ["open_hdf"]
 
+_CACHE = 1 << 26  # no decision: memory; bytes of unpacked chunks that are kept, so that no chunk is unpacked for each block
 _UNIT_KEYS = ("units", "unit", "Unit", "Units", "UNIT")
 
 
@@ -26,10 +27,10 @@ def open_hdf(path: str, file: Path, stack: ExitStack) -> LogTable:
     """
     h5py = library("h5py", "hdf5", path, "an HDF5 file (MAT of version 7.3 is one too)")
     try:
-        root = stack.enter_context(h5py.File(file, "r"))
+        root = stack.enter_context(h5py.File(file, "r", rdcc_nbytes=_CACHE))
         content = _Content(path, _is_matlab(file), file.stat().st_size)
         root.visititems(lambda name, node: content.add(name, node) if isinstance(node, h5py.Dataset) else None)
-    except ReadError:
+    except (ReadError, MemoryError):
         raise
     except Exception as error:  # whatever a damaged file leads h5py into
         what, remedy = ("HDF5", "export a CSV") if not _is_matlab(file) else ("MAT 7.3", "save it with save('log.mat', '-v7')")
