@@ -23,6 +23,7 @@ from gaident.diagnosis.explain.bending import bent_by, relevance_of
 from gaident.diagnosis.explain.determined import determined, not_determined
 from gaident.diagnosis.explain.held_out import standing
 from gaident.diagnosis.explain.late_inside import late_inside
+from gaident.diagnosis.explain.late_together import late_together
 from gaident.diagnosis.explain.verdict import verdict_of
 from gaident.diagnosis.explain.wording import (
     ON_A_SPRING,
@@ -274,13 +275,14 @@ class Work:
         gains, driver, causes, estimates, offset, mechanics, model, check = self.judged()
         findings = findings_of_the_record(self._spoiled(), sum(len(r) for r in self.records), self.step)
         findings += [replace(f, gain=gains.of(f.effect)) for f in self.controller_steps]
+        estimates, together = late_together(self.under, self.estimate, self.found.space.allowed, estimates)
+        self.notes += together
         self.doubts = like_filters(self.data, in_series(self.final)) or late_inside(self.under, self.estimate)
         for effect in causes:
             gain, rivals = self.rivals[effect]
             never = impossible_here(effect, {e: estimates[e] for e in causes}) | self._told_by_the_current
             alternatives = self._alternatives(effect, rivals, offset, never)
-            if effect in self.gain_doubt.rivals:
-                self.notes.append(or_other_gains(effect))
+            self.notes += [or_other_gains(effect)] * (effect in self.gain_doubt.rivals)
             two = self.final.parameters.masses > 1
             one_place = not two or any(t.resonates for t in self.final.parameters.terms)  # beside those nothing is at the load
             steady = LIBRARY[effect].constant and any(self.data.stored)  # a torque that twists the shaft all the time
@@ -299,8 +301,7 @@ class Work:
             self.notes.append(closest(dropped, shown, bool(real)))
         ages = of_the_age(self.under, self.estimate)
         self.notes += (*of_the_mechanics(mechanics, ages, self.data, self.driving.left_open), *check.notes)
-        if self.final.parameters.on_a_spring and any(LIBRARY[e].constant for e in self.final.effects):
-            self.notes.append(ON_A_SPRING)
+        self.notes += [ON_A_SPRING] * (self.final.parameters.on_a_spring and any(LIBRARY[e].constant for e in self.final.effects))
         ambiguous = [f for f in real if f.alternatives]
         proposal = None
         if ambiguous:
