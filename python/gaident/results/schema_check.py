@@ -109,6 +109,9 @@ class _Check:
     def _minimum(self, x: Any, least: float, schema: Schema, at: Place) -> Fault:
         return (at, f"is {x!r}, less than {least:g}") if _TYPES["number"](x) and x < least else None
 
+    def _maximum(self, x: Any, most: float, schema: Schema, at: Place) -> Fault:
+        return (at, f"is {x!r}, more than {most:g}") if _TYPES["number"](x) and x > most else None
+
     def _exclusiveminimum(self, x: Any, least: float, schema: Schema, at: Place) -> Fault:
         return (at, f"is {x!r}, not above {least:g}") if _TYPES["number"](x) and not x > least else None
 

@@ -119,6 +119,18 @@ def test_a_negative_standard_deviation_is_refused(tmp_path: Path) -> None:
             ga.load(path)
 
 
+def test_a_cause_that_takes_away_more_than_all_is_refused(tmp_path: Path) -> None:
+    """A gain of 1e308 was loaded, and the summary rounded its per cent, which are infinite."""
+    data = json.loads((GOLDEN / "saved_0_1" / "diagnosis.json").read_text())
+    assert data["findings"][0]["gain"] <= 1.0
+    path = tmp_path / "dia.json"
+    for gain in (1.5, 1e308, {"number": "inf"}):
+        data["findings"][0]["gain"] = gain
+        path.write_text(json.dumps(data))
+        with pytest.raises(ga.GaidentError, match=r"findings\.0\.gain"):
+            ga.load(path)
+
+
 @pytest.mark.parametrize("encoding", ["uJf-8", "gb2312", "utf-7", "idna"])
 def test_an_xml_of_an_unknown_encoding_is_refused(encoding: str, tmp_path: Path) -> None:
     path = tmp_path / "trace.xml"
