@@ -106,6 +106,12 @@ class _Check:
     def _maxitems(self, x: Any, most: int, schema: Schema, at: Place) -> Fault:
         return (at, f"has {len(x)} entries, at most {most} may be there") if isinstance(x, list) and len(x) > most else None
 
+    def _minimum(self, x: Any, least: float, schema: Schema, at: Place) -> Fault:
+        return (at, f"is {x!r}, less than {least:g}") if _TYPES["number"](x) and x < least else None
+
+    def _maximum(self, x: Any, most: float, schema: Schema, at: Place) -> Fault:
+        return (at, f"is {x!r}, more than {most:g}") if _TYPES["number"](x) and x > most else None
+
     def _exclusiveminimum(self, x: Any, least: float, schema: Schema, at: Place) -> Fault:
         return (at, f"is {x!r}, not above {least:g}") if _TYPES["number"](x) and not x > least else None
 

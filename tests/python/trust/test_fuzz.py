@@ -108,6 +108,37 @@ def test_what_is_left_depends_on_a_signal_that_has_words(tmp_path: Path) -> None
         ga.load(path)
 
 
+def test_a_negative_standard_deviation_is_refused(tmp_path: Path) -> None:
+    """It was loaded, and the summary took its logarithm."""
+    data = json.loads((GOLDEN / "saved_0_1" / "identification.json").read_text())
+    path = tmp_path / "idn.json"
+    for std in (-1.0, {"number": "-inf"}):
+        data["parameters"]["gain"]["std"] = std
+        path.write_text(json.dumps(data))
+        with pytest.raises(ga.GaidentError, match=r"parameters\.gain\.std"):
+            ga.load(path)
+
+
+def test_a_cause_that_takes_away_more_than_all_is_refused(tmp_path: Path) -> None:
+    """A gain of 1e308 was loaded, and the summary rounded its per cent, which are infinite."""
+    data = json.loads((GOLDEN / "saved_0_1" / "diagnosis.json").read_text())
+    assert data["findings"][0]["gain"] <= 1.0
+    path = tmp_path / "dia.json"
+    for gain in (1.5, 1e308, {"number": "inf"}):
+        data["findings"][0]["gain"] = gain
+        path.write_text(json.dumps(data))
+        with pytest.raises(ga.GaidentError, match=r"findings\.0\.gain"):
+            ga.load(path)
+
+
+@pytest.mark.parametrize("encoding", ["uJf-8", "gb2312", "utf-7", "idna"])
+def test_an_xml_of_an_unknown_encoding_is_refused(encoding: str, tmp_path: Path) -> None:
+    path = tmp_path / "trace.xml"
+    path.write_text(f'<?xml version="1.0" encoding="{encoding}" ?>\n<traceSession version="01.00"></traceSession>\n')
+    with pytest.raises(ga.GaidentError, match=r"trace\.xml"):
+        ga.read(path)
+
+
 def test_a_word_between_decimal_commas_and_blanks(tmp_path: Path) -> None:
     """Of as many numbers and words when it is cut at its commas: it was cut there, and gave 30 and 0000."""
     for form in ("{:.3f}", "{:.5e}"):

@@ -75,7 +75,9 @@ def open_sinumerik(path: str, file: Path, options: TextOptions, stack: ExitStack
     try:
         for event, element in ElementTree.iterparse(file, events=("start", "end")):
             trace.pass_by(event, element)
-    except ElementTree.ParseError as error:
+    except ReadError:
+        raise
+    except (ElementTree.ParseError, LookupError, ValueError) as error:  # the latter two: of an encoding that Python lacks
         raise ReadError(f"{path}: not a whole XML file ({first_line(error)}); copy it again") from None
     return trace.table()
 
