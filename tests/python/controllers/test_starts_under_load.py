@@ -31,6 +31,7 @@ LOOPS: dict[str, dict[str, Any]] = {
     "IP": {"velocity": {"command_weight": 0.0}},
     "limit": {"velocity": {"torque_limit": 1.2, "anti_windup": "hold"}},
     "low pass": {"torque_filters": ga.LowPass(time_constant=0.4e-3)},
+    "slow low pass": {"torque_filters": ga.LowPass(time_constant=2.5e-3)},
     "notch": {"torque_filters": ga.Notch(frequency=200.0, numerator_damping=0.1, denominator_damping=0.7)},
     "velocity filter": {"velocity_filters": ga.LowPass(time_constant=0.5e-3)},
     "delay": {"delay": T},
