@@ -198,6 +198,8 @@ def parser_of(commands: Mapping[str, str]) -> argparse.ArgumentParser:
     )
     g.add_argument("--accuracy", nargs="+", metavar="X", help=ACCURACY)
     g.add_argument("--quick", action="store_true", help="name the first cause and stop: to look at a log, or at many")
+    text = "diagnose variations of the logs too, and count how often the same causes are named; some eight times as long"
+    g.add_argument("--stability", action="store_true", help=text)
     g.add_argument("--seed", type=int, default=0, metavar="N", help="same seed, same result (default 0)")
     g = sub.add_argument_group("results")
     g.add_argument("--out", metavar="FILE", help="save the diagnosis (JSON)")

@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from gaident.drive.drive_file import Drive
     from gaident.results.diagnosis import Diagnosis
     from gaident.results.identification import Identification
+    from gaident.results.what_if import Stability
 
 __all__ = ["ResultFiles", "shown_block", "write_report"]
 
@@ -54,8 +55,12 @@ class ResultFiles:
         drive: Drive,
         figure: Callable[[], Figure],
         doing: Callable[[str], None],
+        stability: Stability | None = None,
     ) -> list[Path]:
-        """Write those that were asked for and return them; figure: draws the picture; doing: told what is under way."""
+        """Write those that were asked for and return them.
+
+        figure: draws the picture; doing: told what is under way; stability: of a diagnosis, for its page.
+        """
         if self.result is not None:
             with naming(self.result):
                 result.save(self.result)
@@ -66,7 +71,7 @@ class ResultFiles:
             save_figure(figure_in_units(figure(), scales_of(drive.units_shown, drive.axis)), self.picture)
         if self.page is not None:
             doing(f"writing {self.page}")
-            write_report(result, self.page, records, validation, drive, self.live)
+            write_report(result, self.page, records, validation, drive, self.live, stability)
         return [path for path in (self.result, self.picture, self.page) if path is not None]
 
 
@@ -84,11 +89,12 @@ def write_report(
     validation: Sequence[Record],
     drive: Drive,
     live: bool,
+    stability: Stability | None = None,
 ) -> int:
     """The page; returns its size [bytes]."""
     from gaident.reporting.report import report_page
 
-    page = report_page(result, records, validation, drive.axis, drive.units_shown, drive.about, live).encode()
+    page = report_page(result, records, validation, drive.axis, drive.units_shown, drive.about, live, stability).encode()
     write(target, page)
     return len(page)
 

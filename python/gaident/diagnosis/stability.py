@@ -31,7 +31,7 @@ from gaident.errors import GaidentError, SettingsError
 from gaident.results.diagnosis import Diagnosis
 from gaident.results.what_if import Stability, Variation
 
-__all__ = ["stability"]
+__all__ = ["causes_of", "stability"]
 
 Make = Callable[[Record], Record]
 
@@ -64,11 +64,12 @@ def stability(
         except GaidentError as error:
             found.append(Variation(what, "", refused=str(error)))
         else:
-            found.append(Variation(what, one.verdict, _causes_of(one), tuple(sorted(one.not_testable))))
-    return Stability(dia.verdict, _causes_of(dia), tuple(found))
+            found.append(Variation(what, one.verdict, causes_of(one), tuple(sorted(one.not_testable))))
+    return Stability(dia.verdict, causes_of(dia), tuple(found))
 
 
-def _causes_of(dia: Diagnosis) -> tuple[tuple[str, ...], ...]:
+def causes_of(dia: Diagnosis) -> tuple[tuple[str, ...], ...]:
+    """Of each cause its name, then those from which it is not told apart."""
     return tuple((f.effect, *f.alternatives) for f in dia.causes)
 
 

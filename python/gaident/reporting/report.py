@@ -15,6 +15,7 @@ from gaident.checks import check_installed, yes_or_no
 from gaident.control.pi import bare_pi
 from gaident.data.record import Record
 from gaident.diagnosis.explain.evidence import velocity_curve
+from gaident.diagnosis.stability import causes_of
 from gaident.errors import GaidentError
 from gaident.files import check_writable, write_whole
 from gaident.identification.response.averaged import response_of, responses_of
@@ -22,6 +23,7 @@ from gaident.reporting.remedies import remedies_of
 from gaident.reporting.runs import run_of
 from gaident.results.diagnosis import Diagnosis
 from gaident.results.identification import Identification
+from gaident.results.what_if import Stability
 from gaident.show.report.page import page, page_of_several
 from gaident.show.report.views import View
 from gaident.show.units import scales_of
@@ -45,6 +47,7 @@ def report(
     units: Mapping[str, str | float] | None = None,
     about: Mapping[str, str] | None = None,
     live: bool = True,
+    stability: Stability | None = None,
 ) -> None:
     """Write a result as one HTML page that needs nothing else: no network, no other file, no Python.
 
@@ -76,6 +79,8 @@ def report(
         What stands below the title: ``{"date": "2026-11-22", "machine": "X1", "customer": "...", "text": "..."}``, any keys.
     live : bool
         False: pictures in place of figures that zoom; a page of some 0.3 MB, to be mailed or printed.
+    stability : Stability, optional
+        Of one diagnosis: what `Diagnosis.stability` gave. The page then says how often each cause is named again.
 
     Raises
     ------
@@ -100,7 +105,7 @@ def report(
     True
     """
     check_writable(path)
-    write_whole(path, report_page(result, records, validation, axis, units, about, live).encode())
+    write_whole(path, report_page(result, records, validation, axis, units, about, live, stability).encode())
 
 
 def report_page(
@@ -111,12 +116,20 @@ def report_page(
     units: Mapping[str, str | float] | None = None,
     about: Mapping[str, str] | None = None,
     live: bool = True,
+    stability: Stability | None = None,
 ) -> str:
     """The text of what `report` writes."""
     check_installed(NEEDED, "pictures", "a report")
     if about is not None and not isinstance(about, Mapping):
         raise GaidentError(f"about is {about!r:.80}: give a dictionary of texts, for example {{'machine': 'press 4'}}")
     yes_or_no(live, "live", GaidentError)
+    if stability is not None:
+        if not isinstance(stability, Stability) or not isinstance(result, Diagnosis):
+            raise GaidentError(f"stability is {stability!r:.80}: give what dia.stability() gave of the one diagnosis, or None")
+        if stability.causes != causes_of(result):
+            raise GaidentError(
+                "stability is of a diagnosis with other causes: give what dia.stability() of this one gave, or None"
+            )
     for key, value in (about or {}).items():
         if not isinstance(value, str):
             raise GaidentError(f"about: {key} is {value!r}: give text")
@@ -132,7 +145,7 @@ def report_page(
         view = view_of(result, records, validation, axis)
         if isinstance(result, Diagnosis):
             made_of = _fitted(result, _records(records, result.records, "records"))
-            view = replace(view, remedies=remedies_of(result, made_of))
+            view = replace(view, remedies=remedies_of(result, made_of), stability=stability)
         return page(result, whole(view), plotly_js)
     named = _named(result)
     given = {rec.digest: rec for rec in (*_records(records, (), "records"), *_records(validation, (), "validation"))}

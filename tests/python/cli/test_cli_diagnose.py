@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -16,6 +17,7 @@ from drive_cases import random_case
 from friction_drive import CONTROLLER, drive_record
 from gaident.cli import main
 from gaident.cli.output import csv_text
+from gaident.results.what_if import Stability, Variation
 
 LOOP = ("--kp", str(CONTROLLER.kp), "--ki", str(CONTROLLER.ki))
 
@@ -45,6 +47,29 @@ def test_it_says_what_is_wrong_and_writes_files(here: Path, capsys: pytest.Captu
     assert main(["simulate", "dia.json", "run1.csv", "--out", "again.csv"]) == 0
     assert "fit 99." in capsys.readouterr().out
     assert "contains no identification" in refusal(["diagnose", "run0.csv", *LOOP, "--model", "dia.json"], capsys)
+
+
+def test_variations_of_the_log_are_printed_and_stand_in_the_page(
+    here: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    asked: list[tuple[int, float | None]] = []
+
+    def once(dia: ga.Diagnosis, records: Sequence[ga.Record], pitch: float | None, progress: object) -> Stability:
+        asked.append((len(records), pitch))
+        named = Variation("first half", "explained", (("coulomb_friction",),))
+        return Stability(dia.verdict, (("coulomb_friction",),), (named, Variation("second half", "adequate")))
+
+    monkeypatch.setattr(ga.Diagnosis, "stability", once)
+    assert main(["diagnose", "run0.csv", *LOOP, "--stability", "--report", "page.html", "--pictures"]) == 0
+    out, _ = capsys.readouterr()
+    assert out.index("Verdict explained in 1 of 2 variations") > out.index("Verdict: explained") and asked == [(1, None)]
+    assert "coulomb_friction: named in 1 of 2 variations that could show it: a hint" in out
+    page = Path("page.html").read_text(encoding="utf-8")
+    assert "Is it beyond doubt?" in page and page.index("first half") < page.index("second half")
+    assert main(["diagnose", "run0.csv", *LOOP, "--stability", "--json"]) == 0
+    assert [v["what"] for v in json.loads(capsys.readouterr().out)["stability"]["variations"]] == ["first half", "second half"]
+    assert main(["diagnose", "run0.csv", *LOOP, "--json"]) == 0
+    assert "stability" not in json.loads(capsys.readouterr().out) and len(asked) == 2
 
 
 def test_a_log_whose_name_is_no_utf_8(here: Path, capsys: pytest.CaptureFixture[str]) -> None:

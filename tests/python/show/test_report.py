@@ -20,6 +20,7 @@ from gaident.cli import main
 from gaident.cli.output import csv_text
 from gaident.errors import GaidentError, SettingsError
 from gaident.reporting.report import report_page, view_of
+from gaident.results.what_if import Stability, Variation
 from gaident.show.chart import BINS, PALETTES, Band, Chart, Mark, Panel, Trace, cloud, series
 from gaident.show.diagnosis_charts import residual_spectrum
 from gaident.show.draw import picture
@@ -277,3 +278,20 @@ def test_the_command_line_writes_the_page(
         assert main(arguments) == 2
         assert words in capsys.readouterr().err
     assert sorted(p.name for p in tmp_path.iterdir()) == ["a.html", "b.html", "c.html", "idn.json", "own.json", "run0.csv"]
+
+
+def test_what_variations_say_is_a_chapter_where_it_is_of_this_diagnosis(dia: ga.Diagnosis, fast: None) -> None:
+    named = tuple((f.effect, *f.alternatives) for f in dia.causes)
+    shown = Stability(
+        dia.verdict, named, (Variation("first half", "explained", named), Variation("every second line", "adequate"))
+    )
+    seen = Reader(report_page(dia, stability=shown))
+    text = seen.text[seen.text.rindex("Is it beyond doubt?") :]
+    assert text.index("named in 1 of 2 variations") < text.index("first half") < text.index("every second line")
+    assert "not named" in text and "Is it beyond doubt?" not in Reader(report_page(dia)).text
+    other = Stability(dia.verdict, (("backlash",),), ())
+    for wrong, message in ((other, "with other causes"), ("stable", "give what dia.stability")):
+        with pytest.raises(ga.GaidentError, match=message):
+            report_page(dia, stability=wrong)  # type: ignore[arg-type]
+    with pytest.raises(ga.GaidentError, match="of the one diagnosis"):
+        report_page([dia], stability=shown)

@@ -24,21 +24,26 @@ from gaident.results.diagnosis import Diagnosis
 from gaident.results.identification import Identification
 from gaident.results.json_text import on_axis
 from gaident.results.store import load
+from gaident.results.what_if import Stability
 from gaident.show.progress_bar import Progress
 from gaident.show.wording import cause_words, either, number, table
 
 __all__ = ["diagnose_command"]
+
+Result = tuple[Drive, Diagnosis, Stability | None]
 
 
 def diagnose_command(args: Namespace) -> int | None:
     names = () if args.drive is None else axes_in(args.drive)
     if names and (args.select is None or len(args.select) > 1):
         return _several(args, args.select or names)
-    drive, dia, written = _diagnosed(args)
+    drive, dia, shown, written = _diagnosed(args)
     if args.json:
-        print_json(_data(drive, dia))
+        print_json(_data(drive, dia, shown))
         return None
     print(dia.summary(drive.axis, drive.units_shown))
+    if shown is not None:
+        print(f"\n{shown.summary()}")
     if args.next_command is not None and dia.next_experiment is None:
         print(f"\nnot written: {args.next_command}, as there is no next experiment to propose")
     if written:
@@ -46,27 +51,28 @@ def diagnose_command(args: Namespace) -> int | None:
     return None
 
 
-def _data(drive: Drive, dia: Diagnosis) -> dict[str, Any]:
+def _data(drive: Drive, dia: Diagnosis, shown: Stability | None) -> dict[str, Any]:
     """A diagnosis as --json prints it: in the words and units of its axis, and in those of [show]."""
-    return {**on_axis(dia.to_dict(), drive.axis), **shown_block(dia, drive)}
+    varied = {} if shown is None else {"stability": shown.to_dict()}
+    return {**on_axis(dia.to_dict(), drive.axis), **shown_block(dia, drive), **varied}
 
 
 def _several(args: Namespace, names: Sequence[str]) -> int | None:
     """Every axis by itself: a table with a row for each, then their summaries. An axis that cannot be diagnosed is a row too."""
     if args.model is not None:
         raise SettingsError("--model is the identification of one axis: name the axis with --select, or leave it out")
-    found: dict[str, tuple[Drive, Diagnosis] | GaidentError] = {}
+    found: dict[str, Result | GaidentError] = {}
     written: list[Path] = []
     for name in names:
         paths = {option: getattr(args, option) for option in ("out", "plot", "report", "next_command")}
         of_axis = {o: str(Path(path).with_stem(f"{Path(path).stem}_{name}")) for o, path in paths.items() if path is not None}
         own = Namespace(**{**vars(args), **of_axis, "select": [name]})
         try:
-            drive, dia, more = _diagnosed(own)
+            drive, dia, shown, more = _diagnosed(own)
         except GaidentError as error:
             found[name] = error
         else:
-            found[name] = drive, dia
+            found[name] = drive, dia, shown
             written += more
     failed = sum(isinstance(result, GaidentError) for result in found.values())
     if args.json:
@@ -76,23 +82,25 @@ def _several(args: Namespace, names: Sequence[str]) -> int | None:
     print("\n".join(table([("axis", "verdict", "cause", "rmse, linear", "extended", ""), *starmap(_row, found.items())], "")))
     for name, result in found.items():
         if not isinstance(result, GaidentError):
-            print(f"\n--- {name}\n\n{result[1].summary(result[0].axis, result[0].units_shown)}")
+            drive, dia, shown = result
+            varied = "" if shown is None else f"\n\n{shown.summary()}"
+            print(f"\n--- {name}\n\n{dia.summary(drive.axis, drive.units_shown)}{varied}")
     if written:
         print(f"\nwritten: {', '.join(map(str, written))}")
     return 1 if failed else None
 
 
-def _row(name: str, result: tuple[Drive, Diagnosis] | GaidentError) -> tuple[str, ...]:
+def _row(name: str, result: Result | GaidentError) -> tuple[str, ...]:
     if isinstance(result, GaidentError):
         return name, "not diagnosed", in_options(result), "", "", ""
-    drive, dia = result
+    drive, dia, _ = result
     found = (either(f, dia, drive.axis) if f.alternatives else cause_words(f, dia, drive.axis) for f in dia.causes)
     causes = ", ".join(found) or "none"
     return name, dia.verdict, causes, number(dia.before.rmse), number(dia.after.rmse), velocity_unit(drive.axis)
 
 
-def _diagnosed(args: Namespace) -> tuple[Drive, Diagnosis, list[Path]]:
-    """(the drive, its diagnosis, the files that were written)."""
+def _diagnosed(args: Namespace) -> tuple[Drive, Diagnosis, Stability | None, list[Path]]:
+    """(the drive, its diagnosis, what variations of its records say where that is asked for, the files that were written)."""
     drive = drive_of(args)
     sources = [*args.logs, *(args.validation or []), *([] if args.model is None else [args.model])]
     following = target_of(args.next_command, sources)
@@ -128,8 +136,9 @@ def _diagnosed(args: Namespace) -> tuple[Drive, Diagnosis, list[Path]]:
             quick=args.quick,
             expected=drive.expected,
         )
-        written = files.write(dia, records, validation or (), drive, lambda: dia.plot(axis=drive.axis), bar.doing)
+        shown = dia.stability(records, drive.pitch, progress) if args.stability else None
+        written = files.write(dia, records, validation or (), drive, lambda: dia.plot(axis=drive.axis), bar.doing, shown)
     if following is not None and dia.next_experiment is not None:
         write(following, proposal_csv(dia.next_experiment, drive.axis).encode())
         written.append(following)
-    return drive, dia, written
+    return drive, dia, shown, written

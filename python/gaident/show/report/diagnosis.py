@@ -47,6 +47,7 @@ from gaident.show.report.parts import (
     tile,
 )
 from gaident.show.report.remedies import remedies_section
+from gaident.show.report.stability import stability_section
 from gaident.show.report.views import View
 from gaident.show.second_method import comparison_rows, force_rows, force_words, method_words
 from gaident.show.wording import (
@@ -153,6 +154,7 @@ def chapters(dia: Diagnosis, view: View, drawn: Charts) -> list[Section]:
         measured_section(view, noise, drawn),
         missing_section(view, noise, drawn, tag("p", left) if left else ""),
         _causes(dia, view),
+        *stability_section(view),
         _parameters(dia, view, drawn),
         _gain(dia, view, drawn),
         remedies_section(view, drawn),

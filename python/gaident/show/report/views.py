@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from gaident.results.frequency import Responses
 from gaident.results.retuning import Retuning
+from gaident.results.what_if import Stability
 from gaident.show.units import Scales
 
 __all__ = ["Beforehand", "Curve", "LoopCurves", "Mended", "RecordView", "Remedies", "Vector", "View"]
@@ -139,6 +140,7 @@ class View:
     longest record, see `gaident.results.frequency.Responses`; without it no_response says why. made_with: what computed
     and drew the page -> version. axis: "rotary" or "linear". scales: to the user's units. about: what stands below the title.
     remedies: what to do with a diagnosis; None where that is not worked out.
+    stability: what variations of its records say, likewise.
     """
 
     runs: tuple[RecordView, ...] = ()
@@ -150,6 +152,7 @@ class View:
     scales: Scales = field(default_factory=dict)
     about: Mapping[str, str] = field(default_factory=dict)
     remedies: Remedies | None = None
+    stability: Stability | None = None
 
     @property
     def fitted(self) -> tuple[RecordView, ...]:
