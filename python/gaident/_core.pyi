@@ -316,7 +316,7 @@ class EffectRecord:
         loop: Loop,
         velocity_feedforward: NDArray[np.float64] = ...,
         torque_feedforward: NDArray[np.float64] = ...,
-        torque_before: float = ...,
+        torque_before: float = 0.0,
     ) -> None: ...
     def simulate(
         self,

@@ -28,7 +28,7 @@ from gaident.estimation.dataset import DataSet
 from gaident.estimation.least_squares import fit
 from gaident.estimation.objective import Fit, Objective
 from gaident.models import simulate
-from gaident.models.made_torque import stored_torque
+from gaident.models.made_torque import load_before, stored_torque
 from gaident.models.model import Model
 from gaident.models.simulate import initial_state
 from gaident.models.starts import noise_std, starts_moving, torque_before
@@ -288,7 +288,7 @@ def start_state(model: Model, rec: Record, controller: Controller | None, read: 
         return np.append(np.zeros(model.mechanism.order), stored)
     pi = bare_pi(loop)
     if controller is None and not starts_moving(rec, pi):
-        before = torque_before(rec, 0.0 if read is None else stored_torque(rec, read))
+        before = torque_before(rec, load_before(rec, read))
         return np.append(np.zeros(model.mechanism.order), before) if before else None
     if not starts_moving(rec, pi) or (controller is not None and (controller.limited or model.effects)):
         return None

@@ -27,7 +27,7 @@ from gaident.estimation.mean_velocity import means, with_middles
 from gaident.estimation.period import period_of_place
 from gaident.estimation.term import Term, limiting_of
 from gaident.models.drive_torque import as_late, torque_of
-from gaident.models.made_torque import stored_torque
+from gaident.models.made_torque import load_before, stored_torque
 from gaident.models.simulate_many import LoadedRecord
 from gaident.models.simulation_input import followed
 from gaident.models.starts import noise_std, starts_moving, torque_before
@@ -275,7 +275,8 @@ class DataSet:
         """One record as the core takes it; at: its place among the records."""
         if controller is not None:
             return LoadedRecord.of(rec, controller)
-        return LoadedRecord.of(self.ready(rec, at), None, torque_before(rec, self.stored[at]))
+        ready = self.ready(rec, at)
+        return LoadedRecord.of(ready, None, torque_before(ready, load_before(self.records[at], self.controller)))
 
     @cached_property
     def _loaded(self) -> dict[tuple[str, Controller | None], tuple[LoadedRecord, ...]]:

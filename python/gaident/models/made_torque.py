@@ -38,10 +38,11 @@ from gaident.data.torque_kind import MEAN
 from gaident.models.starts import constant_beside
 from gaident.policy.table import POLICY
 
-__all__ = ["late", "made_at_its_clock", "stored_beside", "stored_torque"]
+__all__ = ["late", "load_before", "made_at_its_clock", "stored_beside", "stored_torque"]
 
 Vector = NDArray[np.float64]
 
+CUT = 2.0  # no decision: a formula: lines, the one that was cut and the first one
 PARTS = 20  # no decision: of a record, the longer of the two spans; from 5 to 80, a level is off by as much
 
 
@@ -52,6 +53,19 @@ def stored_torque(rec: Record, controller: Controller, driven: bool = True) -> f
     """
     made = _from_rest(rec, controller, driven)
     return 0.0 if rec.torque is None or made is None else stored_beside(rec.torque, made, controller)
+
+
+def load_before(rec: Record, controller: Controller | None) -> float:
+    """What the integrator stored before a record for a load that stood there [N m]; 0 where nothing shows one.
+
+    What the first error alone makes within two lines is no load: the record was cut behind a step of the command, and which
+    torque acted before it is not known.
+    """
+    stored = 0.0 if controller is None else stored_torque(rec, controller)
+    if controller is None or stored == 0.0 or not controller.replayable(rec):
+        return stored
+    error = float(abs(controller.asked(rec)[0] - rec.velocity[0]))
+    return stored if abs(stored) > CUT * controller.gains.ki * rec.dt * error else 0.0
 
 
 def stored_beside(torque: Vector, made: Vector, controller: Controller) -> float:

@@ -151,7 +151,6 @@ def _no_simulator(monkeypatch: pytest.MonkeyPatch) -> None:
     def simulated(*args: object, **more: object) -> None:
         raise AssertionError("a move on the toy has asked the simulator")
 
-    monkeypatch.setattr(prediction, "simulate_values", simulated)
     monkeypatch.setattr(LoadedRecord, "velocities", simulated)
     monkeypatch.setattr(side_moves, "LIBRARY", LIBRARY)
     for module in (moves, model_space):

@@ -9,6 +9,7 @@ import pytest
 
 import gaident as ga
 from drive_rig import Noise, Plant, rig, skip_without_library
+from gaident.models.made_torque import load_before, stored_torque
 from gaident.models.starts import torque_before
 
 LOAD, DT = -1.5, 2.5e-4
@@ -79,3 +80,15 @@ def test_a_delay_under_a_standing_load_is_found_as_it_is(given: bool) -> None:
     delay, lag = by_name["transport_delay"]["delay"], next(iter(by_name["torque_lag"].values()))
     assert abs(delay.value - DT) < 4.0 * delay.std and abs(lag.value - 2.2e-4) < 4.0 * lag.std, dia.summary()
     assert by_name["load_torque"]["torque"].value == pytest.approx(LOAD, rel=1e-3)
+
+
+@pytest.mark.parametrize(("load", "cut"), [(0.0, 0), (0.0, 1), (LOAD, 0), (LOAD, 1)])
+def test_a_record_that_was_cut_behind_a_step_begins_under_no_load(load: float, cut: int) -> None:
+    """Its integrator holds what the error of the lines before has made."""
+    controller, command = ga.PI(kp=1.0, ki=40.0), np.repeat([20.0, -20.0, 10.0], 100)
+    drive = ga.OneMass(J=0.00875, D=0.0066).model().with_effect("load_torque", torque=load)
+    drive = drive.with_effect("transport_delay", delay=2.0 * DT)  # so that it stands at the line behind the step, too
+    made = ga.run(drive, ga.Record(DT, command=command, velocity=0.0 * command), controller, initial_state=[0.0, load])
+    rec = ga.Record(DT, command=command, velocity=made.velocity, torque=made.torque)[cut:]
+    assert (stored_torque(rec, controller) != 0.0) == bool(load or cut)
+    assert load_before(rec, controller) == pytest.approx(load, rel=0.2) and load_before(rec, None) == 0.0
