@@ -237,7 +237,7 @@ def _under_load(
         return None
     cascade, known = cascade_of(controller), len(rec) - controller.ahead(rec.dt)
     filtered = cascade.torque_filters or cascade.velocity_filters or cascade.command_filters
-    edge = min(POLICY.filter_memory, known // 4) if filtered else 0  # no decision: at most a quarter of the record
+    edge = min(POLICY.filter_memory, known // 4) if filtered else 0  # no decision: a quarter of the record is left out at most.
     made = controller.torque_of(rec, stored=start)
     if filtered:
         start += float(np.median((logged - made)[edge:known]))
