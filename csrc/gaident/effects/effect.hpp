@@ -35,7 +35,7 @@
 //
 // An effect may also have
 //
-//   - begin(c, s, Beginning)   its state where the record begins in motion
+//   - begin(c, s, Beginning)   its state where the record begins: in motion, or under a torque
 //   - possible(p)              false where there is no such drive
 //   - tabulate(p, PreparedFor, t)   makes a `Table` t for what is not a number per lane; reach(t, steps): how many torques back it looks
 //   - later(p, delay)          its parameters with the controller's delay [s] added: so it acts where it is not in the model, too

@@ -91,7 +91,7 @@ def effect_record(
     """A record and its loop, for models with effects and for every controller.
 
     source: command [rad/s], in the open loop torque [N m], with a position controller position command [rad]; of
-    `Controller.source_of`. torque_before: of the open loop, before a record that begins at rest [N m].
+    `Controller.source_of`. torque_before: of the open loop, before the record [N m].
     """
     ticks = of_lines(source, position) if controller is None else controller.ticks(dt, source, position)
     return _core.EffectRecord(

@@ -118,7 +118,7 @@ def checked_substeps(substeps: int | None) -> int:
 
 
 def core_record(rec: Record, source: Signal, controller: Controller | None, before: float = 0.0) -> _core.EffectRecord:
-    """A record as the core takes it; before: the torque that acted before it, of an open loop from rest [N m]."""
+    """A record as the core takes it; before: the torque that acted before it, of an open loop [N m]."""
     start = 0.0 if controller is None else controller.start_angle(source)
     if rec.position is not None:
         start = float(rec.position[0])

@@ -24,14 +24,14 @@ from gaident.estimation.uncertainty import covariance_of
 from gaident.models.effects_linear import LINEAR
 from gaident.policy.table import POLICY
 
-__all__ = ["late_inside"]
+__all__ = ["is_late", "late_inside"]
 
 
 def late_inside(objective: Objective, fit: Fit) -> list[Text]:
     """Note on what a controller lacks that makes its torque late; objective: under which the model was estimated."""
     data = objective.data
     closed = fit.predictor.closed and data.slower and data.torque_logged and data.left_in_loop
-    if not closed or fit.impacts or not _late_terms(fit):
+    if not closed or fit.impacts or not any(map(is_late, fit.parameters.terms)):
         return []
     driven = replace(fit.hypothesis, predictor=OpenLoop(data, fit.predictor.own_angle))
     behind = ls.reestimated(objective, ls.fit(objective, driven, fit.x, fit.noise, POLICY.usual))
@@ -48,15 +48,15 @@ def late_inside(objective: Objective, fit: Fit) -> list[Text]:
     return [say(text, 1e3 * inside, 1e3 * one, 1e3 * outside, 1e3 * other, 1e3 * (inside - outside))]
 
 
-def _late_terms(fit: Fit) -> list[Term]:
-    """What is linear and late in series; a resonance may be another mass."""
-    return [t for t in fit.parameters.terms if t.name in LINEAR and not t.resonates]
+def is_late(term: Term) -> bool:
+    """Linear and late in series; a resonance may be another mass."""
+    return term.name in LINEAR and not term.resonates
 
 
 def _late(objective: Objective, fit: Fit) -> tuple[float, float]:
     """(by how much a slow motion follows the torque of a model, its standard deviation) [s]."""
     value, slopes = 0.0, np.zeros(len(fit.x))
-    for term in _late_terms(fit):
+    for term in filter(is_late, fit.parameters.terms):
         slot = fit.parameters.slot(term.name)
         z = fit.x[slot]
         h = 1e-6 * np.maximum(np.abs(z), 1.0)  # no decision: the step of a difference

@@ -17,11 +17,11 @@ from dataclasses import replace
 import numpy as np
 
 from gaident.axis import Text, called, say
+from gaident.diagnosis.explain.late_inside import is_late
 from gaident.diagnosis.library.equivalences import equivalents
 from gaident.estimation import least_squares as ls
 from gaident.estimation.objective import Fit, Objective
 from gaident.estimation.term import Term
-from gaident.models.effects_linear import LINEAR
 from gaident.policy.table import POLICY
 from gaident.results.estimate import Estimate
 
@@ -32,11 +32,11 @@ def late_together(
     objective: Objective, fit: Fit, allowed: Sequence[Term], found: Mapping[str, dict[str, Estimate]]
 ) -> tuple[dict[str, dict[str, Estimate]], list[Text]]:
     """(estimates of effects with what another late one would change, notes); found: those of the model alone."""
-    late = [t for t in fit.parameters.terms if _late(t) and t.name in found]
+    late = [t for t in fit.parameters.terms if is_late(t) and t.name in found]
     if len(late) != 1 or fit.impacts or late[0].size != 1:
         return dict(found), []
     alone = late[0]
-    other = next((t for t in allowed if _late(t) and t.place == "actuator" and t.name not in _same(alone.name)), None)
+    other = next((t for t in allowed if is_late(t) and t.place == "actuator" and t.name not in _same(alone.name)), None)
     beside = None if other is None else _beside(objective, fit, other)
     if other is None or beside is None:
         return dict(found), []
@@ -51,11 +51,6 @@ def late_together(
         "each of them is. Its deviation contains that."
     )
     return estimates, [say(text, 1e3 * value.value, called(other.name), called(alone.name), 1e3 * moved)]
-
-
-def _late(term: Term) -> bool:
-    """Linear and late in series; a resonance may be another mass."""
-    return term.name in LINEAR and not term.resonates
 
 
 def _same(effect: str) -> set[str]:
