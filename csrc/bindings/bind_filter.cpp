@@ -1,4 +1,5 @@
 #include "../gaident/numeric/filter.hpp"
+#include "../gaident/numeric/zero_phase.hpp"
 #include "../gaident/control/replay.hpp"
 #include "bindings.hpp"
 
@@ -53,6 +54,27 @@ RealArray powers_of(const RealArray& b, const RealArray& a, const RealArray& e, 
         const ReleasedGil released;
         filtered_powers(b.data(), a.data(), static_cast<std::size_t>(b.shape(0)), static_cast<std::size_t>(b.shape(1)), e.data(),
                         weight.data(), lengths, sums);
+    }
+    return out;
+}
+
+// Rows of `values` forward and backward through sections (k, 6), each continued by `extension` samples at both ends.
+RealArray smoothed_rows(const RealArray& sections, const RealArray& values, std::size_t extension) {
+    if (sections.ndim() != 2 || sections.shape(1) != 6) throw std::invalid_argument("sections: rows of six numbers are needed");
+    std::vector<Section> all(static_cast<std::size_t>(sections.shape(0)));
+    for (std::size_t i = 0; i < all.size(); ++i) {
+        std::copy_n(sections.data() + 6 * i, 6, all[i].begin());
+        if (all[i][3] != 1.0) throw std::invalid_argument("sections: a_0 of each must be 1");
+    }
+    if (values.ndim() != 2 || values.shape(0) < 1 || values.shape(1) < 1)
+        throw std::invalid_argument("rows: a matrix with at least one number is needed");
+    const auto rows = static_cast<std::size_t>(values.shape(0)), n = static_cast<std::size_t>(values.shape(1));
+    if (extension >= n) throw std::invalid_argument("extension: fewer samples than the " + std::to_string(n) + " of a row");
+    RealArray out({values.shape(0), values.shape(1)});
+    double* const v = out.mutable_data();
+    {
+        const ReleasedGil released;
+        zero_phase(all, values.data(), v, rows, n, extension);
     }
     return out;
 }
@@ -120,6 +142,7 @@ RealArray held(const RealArray& error, const Controller& controller, double newe
 void bind_filter(py::module_& m) {
     m.def("filtered", &filtered_rows, py::arg("b"), py::arg("a"), py::arg("rows"), py::arg("lengths"));
     m.def("filtered_powers", &powers_of, py::arg("b"), py::arg("a"), py::arg("e"), py::arg("weight"), py::arg("lengths"));
+    m.def("zero_phase", &smoothed_rows, py::arg("sections"), py::arg("rows"), py::arg("extension"));
     m.def("errors_of", &errors_of, py::arg("measured"), py::arg("rows"), py::arg("lost"));
     m.def("state_recursion", &states, py::arg("A"), py::arg("drive"), py::arg("start"), py::arg("newest"));
     m.def("lagged_products", &products, py::arg("e"), py::arg("lags"));

@@ -352,27 +352,20 @@ def decode(
 ) -> tuple[float, NDArray[np.complex128], NDArray[np.complex128]]:
     """(gain, poles, zeros) of a chromosome."""
 
-def filtered(
-    b: NDArray[np.float64], a: NDArray[np.float64], rows: NDArray[np.float64], lengths: Sequence[int]
-) -> NDArray[np.float64]:
+def filtered(b: _Real, a: _Real, rows: _Real, lengths: Sequence[int]) -> _Real:
     """v(n) = sum_i b_i e(n-i) - sum_{i>=1} a_i v(n-i) of rows of e, each cut into records of these lengths, from rest."""
 
-def errors_of(measured: NDArray[np.float64], rows: NDArray[np.float64], lost: float) -> NDArray[np.float64]:
+def zero_phase(sections: _Real, rows: _Real, extension: int) -> _Real:
+    """Rows forward and backward through sections of second order, each continued by its point reflection at both ends."""
+
+def errors_of(measured: _Real, rows: _Real, lost: float) -> _Real:
     """measured - rows, written over the rows; `lost` everywhere in a row that comes to it or holds what is no number."""
 
-def filtered_powers(
-    b: NDArray[np.float64],
-    a: NDArray[np.float64],
-    e: NDArray[np.float64],
-    weight: NDArray[np.float64],
-    lengths: Sequence[int],
-) -> NDArray[np.float64]:
+def filtered_powers(b: _Real, a: _Real, e: _Real, weight: _Real, lengths: Sequence[int]) -> _Real:
     """Sum of (weight v)^2 of one row e under each filter, a row of b and of a."""
 
-def state_recursion(
-    A: NDArray[np.complex128], drive: NDArray[np.complex128], start: NDArray[np.complex128], newest: bool
-) -> NDArray[np.complex128]: ...
-def lagged_products(e: NDArray[np.float64], lags: int) -> NDArray[np.float64]:
+def state_recursion(A: _Complex, drive: _Complex, start: _Complex, newest: bool) -> _Complex: ...
+def lagged_products(e: _Real, lags: int) -> _Real:
     """sum_n e(n) e(n-k), k = 0..lags."""
 
 def held_torque(

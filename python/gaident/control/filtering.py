@@ -41,17 +41,9 @@ def zero_phase(sections: Matrix, rows: Matrix, extension: int) -> Matrix:
     at both ends for `extension` samples, fewer than they have.
     As `scipy.signal.sosfiltfilt`, but all rows side by side: a fit asks for it at every step.
     The filter begins and ends at rest at the first and the last value, which pass it unchanged.
+    Raises ValueError where the sizes do not fit.
     """
-    before, after = rows[:, extension:0:-1], rows[:, -2 : -extension - 2 : -1]
-    x = np.hstack([2.0 * rows[:, :1] - before, rows, 2.0 * rows[:, -1:] - after])
-    for _ in ("forward", "backward"):
-        rest = x[:, :1].copy()
-        x = x - rest
-        for section in sections:
-            b, a = np.split(section, 2)
-            x = filtered(b, a, x, [x.shape[1]])
-        x = (x + rest)[:, ::-1]
-    return x[:, extension : extension + rows.shape[1]]
+    return _core.zero_phase(sections, rows, extension)
 
 
 def recursion(A: Complex, drive: ArrayLike, start: ArrayLike | None = None, newest: bool = False) -> Complex:

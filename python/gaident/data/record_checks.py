@@ -16,7 +16,7 @@ from gaident.axis import Text
 from gaident.checks import one_of
 from gaident.data.signals.arrays import MINIMUM_SAMPLES, channel, sample_time
 from gaident.data.signals.decimation import decimated
-from gaident.data.signals.wraps import continued, wrapped_words
+from gaident.data.signals.wraps import continued, overflow, wrapped_words
 from gaident.data.torque_kind import COMMANDED, MEAN, SAMPLE, TORQUE_KINDS, TORQUE_LOGS
 from gaident.errors import RecordError
 
@@ -80,8 +80,11 @@ def unwrapped(channels: dict[str, NDArray[np.float64] | None], dt: float, new: b
 
     Its command goes with it: continued over its own jumps, and within half a range of the position at the first sample.
     new: whether the position is; one of a record was looked at when that was made.
+    Raises RecordError where an integer overflowed in another channel.
     """
     position, command, velocity = (channels[key] for key in ("position", "position_command", "velocity"))
+    for key in ("command", "velocity", "torque") if new else ():
+        not_overflown(channels[key], key)
     made = None if position is None or velocity is None or not new else continued(position, velocity, dt)
     if made is None:
         return ()
@@ -90,6 +93,18 @@ def unwrapped(channels: dict[str, NDArray[np.float64] | None], dt: float, new: b
     if command is not None:
         channels["position_command"] = channel(_beside(np.unwrap(command, period=period), found, period), "position_command")
     return (wrapped_words(wraps, period, Text(" rad", " m")),)
+
+
+def not_overflown(values: NDArray[np.float64] | None, key: str) -> None:
+    """Raises RecordError where a channel jumps as an integer does that overflowed."""
+    if values is None or (found := overflow(values)) is None:
+        return
+    n, period = found
+    raise RecordError(
+        f"{key}: it jumps from {values[n]:g} to {values[n + 1]:g} at sample {n + 1} between steady values: an integer overflowed "
+        f"there, whose range is {period:g}; log it with more bits or in a coarser unit, or make the Record of "
+        f"numpy.unwrap({key}, period={period:g})"
+    )
 
 
 def _beside(command: NDArray[np.float64], position: NDArray[np.float64], period: float) -> NDArray[np.float64]:

@@ -61,8 +61,12 @@ class Prefilter:
         return float(np.sqrt(slope / max(sum(float(np.sum(e**2)) for e in smooth), 1e-300)))
 
     def _of(self, E: Matrix) -> Matrix:
-        smooth = self._smooth(E)
-        return np.asarray((np.gradient(smooth, self.dt, axis=1) + self.corner * smooth) / self._gain)
+        smooth, slope = self._smooth(E), 1.0 / (self._gain * self.dt)
+        out = smooth * (self.corner / self._gain)
+        out[:, 1:-1] += (0.5 * slope) * (smooth[:, 2:] - smooth[:, :-2])  # no decision: a formula: a central difference
+        out[:, 0] += slope * (smooth[:, 1] - smooth[:, 0])
+        out[:, -1] += slope * (smooth[:, -1] - smooth[:, -2])
+        return out
 
     def _smooth(self, E: Matrix) -> Matrix:
         padding = int(2.0 / (self.cutoff * self.dt))  # samples, two periods of the cutoff

@@ -52,6 +52,7 @@ class Effort:
     led_steps: int = effort(200, "steps", "of that loop in 1/cutoff: its bandwidth is 0.4 * 200/(2 pi) = 13 times the cutoff")
     regressions: int = effort(50, "regressions", "of a discrete model, each filtered by the noise model of the one before")
     noise_draws: int = effort(32, "draws", "of the noise of a measured torque, of which an effect gains by chance")
+    level_draws: int = effort(4, "draws", "of that noise, whose level is all that is asked for")
     rival_reach: float = effort(
         0.5, "1", "of an effect's gain in BIC units, by which another in its place is behind at most to be searched globally"
     )

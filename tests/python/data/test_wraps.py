@@ -13,7 +13,7 @@ import gaident as ga
 from drive_rig import Noise, Plant, rig
 from gaident.axis import said
 from gaident.data.signals.wraps import Unwrapper, overflow
-from gaident.errors import ReadError
+from gaident.errors import ReadError, RecordError
 
 PLANT = Plant(3e-4, 2e-3, 0.03, 1.9, 1e-3)
 COMMAND = np.repeat([40.0, -60.0, 25.0, 0.5], 500)
@@ -93,6 +93,20 @@ def test_an_integer_that_overflowed() -> None:
     assert overflow(counted) is None
     torque = np.sign(np.sin(0.01 * np.arange(3000))) + 1e-4 * np.round(50 * np.random.default_rng(2).standard_normal(3000))
     assert overflow(torque) is None  # a torque that is reversed at full size
+
+
+@pytest.mark.parametrize("key", ["command", "velocity", "torque"])
+def test_a_record_refuses_an_overflown_channel(key: str) -> None:
+    counted = np.round(40_000 * np.sin(8e-3 * np.arange(2000)))
+    channels = {"velocity": np.zeros(2000), "command": np.ones(2000), key: 1e-3 * ((counted + 32768) % 65536 - 32768)}
+    with pytest.raises(
+        RecordError, match=rf"^{key}: it jumps from 32\.\d+ to -32\.\d+ at sample \d+ .* numpy.unwrap\({key}, "
+    ) as found:
+        ga.Record(1e-3, **channels)
+    period = float(str(found.value).rsplit("=", 1)[1].rstrip(")"))
+    repaired = np.unwrap(channels[key], period=period)
+    np.testing.assert_allclose(repaired, 1e-3 * counted, atol=1e-9)
+    ga.Record(1e-3, **(channels | {key: repaired}))
 
 
 def test_read_continues_a_position_and_results_say_so(tmp_path: Path) -> None:

@@ -19,7 +19,7 @@ from scipy.stats import chi2
 import gaident as ga
 from gaident.control.controller import Limiting
 from gaident.diagnosis.library.cause import Cause
-from gaident.diagnosis.selection import mechanisms, model_space, moves, score_test, select, side_moves
+from gaident.diagnosis.selection import mechanisms, model_space, moves, noise_level, rivals, score_test, side_moves
 from gaident.diagnosis.selection.bases import Task
 from gaident.diagnosis.selection.bootstrap import largest_gains
 from gaident.diagnosis.selection.rivals import Replacement, rivals_of
@@ -153,12 +153,14 @@ def _no_simulator(monkeypatch: pytest.MonkeyPatch) -> None:
 
     monkeypatch.setattr(LoadedRecord, "velocities", simulated)
     monkeypatch.setattr(side_moves, "LIBRARY", LIBRARY)
+    monkeypatch.setattr(noise_level, "LIBRARY", LIBRARY)
     for module in (moves, model_space):
         monkeypatch.setattr(module, "LIBRARY", LIBRARY)
         monkeypatch.setattr(module, "equivalents", lambda effect: {"lag": ("seen",), "seen": ("lag",)}.get(effect, ()))
-    monkeypatch.setattr(model_space, "ClosedLoop", lambda data, own=False: Toy(data, own, True))
+    monkeypatch.setattr(noise_level, "ClosedLoop", lambda data, own=False: Toy(data, own, True))
     monkeypatch.setattr(score_test, "ClosedLoop", lambda data, own=False: Toy(data, own, True))
-    monkeypatch.setattr(model_space, "OpenLoop", Toy)
+    for module in (model_space, noise_level):
+        monkeypatch.setattr(module, "OpenLoop", Toy)
     monkeypatch.setattr(moves, "OpenLoop", Toy)
 
 
@@ -380,8 +382,8 @@ def test_of_effects_that_are_the_same_to_every_record_the_first_has_the_name(mon
 
     def better(final: Fit, other: Fit, behind: float) -> Fit | None:
         name = other.effects[0]
-        monkeypatch.setattr(select, "rivals_of", lambda *arguments: (90.0, [Replacement(name, behind, other)]))
-        return select._rivals(bench.space, final, True, lambda effect: (), lambda message: None)[1]
+        monkeypatch.setattr(rivals, "rivals_of", lambda *arguments: (90.0, [Replacement(name, behind, other)]))
+        return rivals.of_each_effect(bench.space, final, True, lambda effect: (), lambda message: None)[1]
 
     assert better(seen, lag, 0.3) is lag, "rounding decides"
     assert better(seen, lag, POLICY.swap + 0.1) is None

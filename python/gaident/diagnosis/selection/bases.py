@@ -62,7 +62,7 @@ class Task:
 
     def space(self) -> Moves:
         policy = replace(POLICY, most_effects=self.most)
-        return Moves(self.objective, self.allowed, self.note, policy, self.shown, self.rigid_below, self.grown)
+        return Moves(self.objective, policy, self.allowed, self.note, self.shown, self.rigid_below, self.grown)
 
     def under(self, family: Innovations | OutputErrors) -> Task:
         return replace(self, objective=self.objective.under(family))

@@ -21,16 +21,16 @@ from gaident.diagnosis.library.equivalences import equivalents
 from gaident.diagnosis.library.sides import called_of
 from gaident.diagnosis.library.terms import LIBRARY
 from gaident.diagnosis.selection.mechanisms import as_two_masses, resonance, swings
+from gaident.diagnosis.selection.noise_level import NoiseLevel
 from gaident.estimation import least_squares as ls
 from gaident.estimation.criterion import cost_of, effective_samples, gained_by_chance
-from gaident.estimation.dataset import DataSet
 from gaident.estimation.global_search import evolved
 from gaident.estimation.noise_model import WHITE
-from gaident.estimation.objective import LOST, Fit, Hypothesis, Innovations, Objective, OutputErrors
-from gaident.estimation.prediction import ClosedLoop, ObserverLoop, OpenLoop, Predictor, torque_noise_draws
+from gaident.estimation.objective import LOST, Fit, Hypothesis, Objective, OutputErrors
+from gaident.estimation.prediction import ObserverLoop, OpenLoop, Predictor, torque_noise_draws
 from gaident.estimation.projection import orthonormal_rows
 from gaident.estimation.term import Term
-from gaident.policy.table import POLICY, Policy
+from gaident.policy.table import POLICY
 
 __all__ = ["Grown", "ModelSpace", "representative", "words"]
 
@@ -77,28 +77,16 @@ class Grown:
 
 
 @dataclass(frozen=True, eq=False)
-class ModelSpace:
+class ModelSpace(NoiseLevel):
     """The models that can be made of a library over one objective, and the moves between them."""
 
-    objective: Objective
     allowed: tuple[Term, ...]
     note: Callable[[str], None]
-    policy: Policy = POLICY
     shown: frozenset[str] = frozenset()  # families of effects that the records show by themselves
     rigid_below: float = 0.0  # rad/s, below which the records show one rigid body
     grown: Grown = field(default_factory=Grown)
 
     # What a model is worth.
-
-    @property
-    def data(self) -> DataSet:
-        """The records."""
-        return self.objective.data
-
-    @property
-    def whitens(self) -> bool:
-        """Whether errors are whitened, each hypothesis with a noise filter of its own."""
-        return isinstance(self.objective.family, Innovations)
 
     @property
     def penalty(self) -> float:
@@ -137,40 +125,6 @@ class ModelSpace:
         """The same for the same mechanism with the same effects, or with equivalent ones."""
         return fit.parameters.kind, frozenset(representative(t) for t in fit.parameters.terms)
 
-    def ratio(self, fit: Fit) -> float:
-        """Rms of the whitened errors over the noise of the velocity."""
-        return float(np.sqrt(fit.cost / self.objective.count)) / max(self.noise_beside(fit), 1e-300)
-
-    def noise_beside(self, fit: Fit) -> float:
-        """Standard deviation of white noise on the velocity, as a fit shows it [rad/s].
-
-        In a log slower than its controller the motion itself has third differences; the errors of a fit have smaller ones.
-        """
-        return self.data.noise_of(self.objective.error(fit))
-
-    def quiet(self, fit: Fit) -> bool:
-        """Whether a fit leaves so little that no effort is spent beyond it."""
-        return self.ratio(fit) < self.policy.effort_ratio
-
-    def is_noise(self, fit: Fit) -> bool:
-        """The variance-ratio test: whether a fit leaves noise."""
-        return self.ratio(fit) < self.policy.noise_ratio
-
-    def small_unwhitened(self, fit: Fit) -> bool:
-        """Whether the errors before whitening, in the loop where there is one, are little more than the noise.
-
-        A loop that begins under a load is only simulated for a model that has the load.
-        Where the torque of each sample is known, small errors under that torque are enough:
-        the simulated loop lacks what the controller answered to noise.
-        """
-        loaded = self.data.simulates_loop and any(LIBRARY[e].constant for e in fit.effects)
-        in_loop = self.data.fits_in_loop or loaded
-        ways = [fit.hypothesis.driven_by(self.closed(fit.predictor)) if in_loop else fit.hypothesis]
-        if in_loop and not self.data.loop_only:
-            ways.append(fit.hypothesis.driven_by(OpenLoop(self.data, fit.predictor.own_angle)))
-        cost = min(float(self.objective.costs(way, fit.x[None, :], WHITE)[0]) for way in ways)
-        return bool(np.sqrt(cost / self.objective.count) < self.policy.free_run_ratio * self.noise_beside(fit))
-
     def worth(self, fuller: Fit, simpler: Fit) -> bool:
         """The decision: whether a fuller model is worth its effects against a simpler one."""
         simpler = self.under_predictor_of(simpler, fuller)
@@ -189,11 +143,8 @@ class ModelSpace:
         """Whether a fuller model gains more than noise on a measured torque would give it by chance; true without one.
 
         That noise lets a free run wander slowly: a constant torque, or a wave of it, explains much of that.
-        Where the command drives the models, in a loop or through a replayed controller, that noise is not in their errors.
         """
-        driven = not fuller.predictor.closed and not any(t.in_controller for t in fuller.parameters.terms)
-        larger = fuller.parameters.size > simpler.parameters.size
-        if not (self.data.torque_measured and driven and larger) or self.whitens:
+        if not (self.hears_torque_noise(fuller) and fuller.parameters.size > simpler.parameters.size):
             return True
         objective = self.objective
         rows = torque_noise_draws(
@@ -239,7 +190,7 @@ class ModelSpace:
         impacts = simpler.impacts
         if self.quiet(fuller) and not impacts:
             return True
-        noise = self.objective.count * self.noise_beside(fuller) ** 2
+        noise = self.objective.count * self.noise_in_errors(fuller) ** 2
         share = self.policy.material_beside_impacts if impacts else self.policy.material_share
         if simpler.cost - fuller.cost > share * (simpler.cost - noise):
             return True
@@ -322,10 +273,6 @@ class ModelSpace:
         return as_fuller.bic - cost_of(freedom, self.objective.information) + self.score(simpler) - simpler.bic
 
     # Fits.
-
-    def closed(self, predictor: Predictor) -> Predictor:
-        """The closed loop with the same angle."""
-        return ClosedLoop(self.data, predictor.own_angle)
 
     def predicted_by(self, fit: Fit, predictor: Predictor) -> Fit:
         """A model fitted under another predictor."""

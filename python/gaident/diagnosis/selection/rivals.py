@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Callable, Collection
 from dataclasses import dataclass
 
+from gaident.diagnosis.selection.model_space import representative, words
 from gaident.diagnosis.selection.moves import Moves
 from gaident.estimation.criterion import chi_square_bound, cost_of
 from gaident.estimation.objective import Fit
 from gaident.estimation.term import Term
 
-__all__ = ["Replacement", "rivals_of"]
+__all__ = ["Classes", "Replacement", "of_each_effect", "rivals_of"]
+
+Classes = Callable[[str], Collection[str]]
 
 
 @dataclass(frozen=True)
@@ -25,6 +28,38 @@ class Replacement:
     def term(self) -> Term:
         """The other effect."""
         return self.fit.parameters.term(self.effect)
+
+
+def of_each_effect(
+    space: Moves, final: Fit, may_swap: bool, classes: Classes, note: Callable[[str], None]
+) -> tuple[dict[str, tuple[float, list[Replacement]]], Fit | None]:
+    """(rivals of each effect, a better model where there is one and a swap is allowed).
+
+    Where a record cannot tell a load or a dead band from dry friction, friction has the name: every axis has it.
+    """
+    found: dict[str, tuple[float, list[Replacement]]] = {}
+    # The effect that gains least comes first: it is the likeliest to be replaced, and then all are compared again.
+    for term in sorted(final.parameters.terms, key=lambda t: space.without(final, t.name).bic):
+        note(f"rivals of {words([term.name])}")
+        here = classes(term.name)
+        gain, rivals = rivals_of(space, final, term.name, here)
+        found[term.name] = (gain, rivals)
+        if not rivals or not may_swap:
+            continue
+        first = rivals[0]
+        contained = term.name in first.fit.parameters.term(first.effect).nested
+        needed = space.penalty if contained else space.margin if first.effect in here else space.policy.swap
+        better = first if first.behind < -needed else None
+        if better is None:
+            # Of effects that these records cannot tell apart, the simplest of a family is preferred to those outside of it.
+            others = (r for r in rivals if r.effect in here and r.behind < space.margin)
+            better = next((r for r in others if r.term.simplest and r.term.family != term.family), None)
+        if better is None and (first_of := representative(term)) != term.name:
+            # Rounding decides between effects that are the same to every record: the first of them has the name.
+            better = next((r for r in rivals if r.effect == first_of and r.behind < space.policy.swap), None)
+        if better is not None:
+            return found, better.fit
+    return found, None
 
 
 def rivals_of(space: Moves, final: Fit, effect: str, equivalent: Collection[str] = ()) -> tuple[float, list[Replacement]]:

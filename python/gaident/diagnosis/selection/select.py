@@ -14,7 +14,7 @@ Long records are searched on a coarser grid of time first.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -25,9 +25,9 @@ from gaident.diagnosis.selection.beam import Beam
 from gaident.diagnosis.selection.beam import reduced as reduced_by
 from gaident.diagnosis.selection.decimated import blocks_of, decimated_objective, moved
 from gaident.diagnosis.selection.mechanisms import drives_itself, resonance, swings
-from gaident.diagnosis.selection.model_space import representative, words
+from gaident.diagnosis.selection.model_space import words
 from gaident.diagnosis.selection.moves import Moves
-from gaident.diagnosis.selection.rivals import Replacement, rivals_of
+from gaident.diagnosis.selection.rivals import Classes, Replacement, of_each_effect
 from gaident.estimation import least_squares as ls
 from gaident.estimation.criterion import Specification, chi_square_bound, effective_samples, specification_statistic
 from gaident.estimation.noise_model import WHITE, ShaftNoise
@@ -39,7 +39,6 @@ from gaident.policy.table import POLICY
 __all__ = ["Selection", "by_whitened_errors", "compared", "selected", "specification"]
 
 Vector = NDArray[np.float64]
-Classes = Callable[[str], Collection[str]]
 
 
 @dataclass(frozen=True, eq=False)
@@ -149,7 +148,7 @@ def _decided(task: Task, note: Callable[[str], None]) -> _Found:
             return replace(by_output, specification=test)
     if again is not None and again.effects and space.is_noise(again) and space.small_unwhitened(again):
         # It leaves noise: no other explanation of the same is searched, only effects that this model may lack.
-        final = _beam(space).run([reduced_by(again, _reductions(space), space.prefers, space.score)])
+        final = _grown(space, again)
         base = space.bare(final)
     else:
         base, final = _explored(task, space, bases)
@@ -182,6 +181,7 @@ def _by_output_errors(output: ByOutputErrors, bases: Sequence[Fit], note: Callab
     """Step 2: the search under output errors.
 
     The information is that of the errors which the best linear model or the regressed axis leaves.
+    Where that axis with its effects leaves noise, only effects that it may lack are searched.
     """
     note("looking at the output errors")
     starts = output_error_bases(output.task, bases)
@@ -189,9 +189,13 @@ def _by_output_errors(output: ByOutputErrors, bases: Sequence[Fit], note: Callab
     axis = output.regressed(least.predictor)
     task = _informed(output, least, axis)
     space = task.space()
+    rigid = None if axis is None else task.objective.rescored(axis)
+    if rigid is not None and rigid.effects and space.quiet(rigid) and space.small_unwhitened(rigid):
+        final = _grown(space, rigid)
+        return _Found(space, space.bare(final), final)
     base, final = _explored(task, space, [task.objective.rescored(f) for f in starts])
-    if axis is not None:
-        final = _improved(space, task.objective.rescored(axis), final)
+    if rigid is not None:
+        final = _improved(space, rigid, final)
     return _Found(space, base, base).of(final)
 
 
@@ -257,12 +261,16 @@ def _reductions(space: Moves) -> tuple[Callable[[Fit], list[Fit]], ...]:
     return space.close, space.exchange, space.other_wave, space.other_side, space.drop, space.simplify, space.demote
 
 
+def _grown(space: Moves, fit: Fit) -> Fit:
+    """What the beam search makes of a model, reduced first."""
+    return _beam(space).run([reduced_by(fit, _reductions(space), space.prefers, space.score)])
+
+
 def _improved(space: Moves, other: Fit, best: Fit) -> Fit:
     """Another model, reduced and grown, in the place of the best one where it scores better."""
     if space.score(other) > space.score(best) + space.penalty:
         return best
-    other = reduced_by(other, _reductions(space), space.prefers, space.score)
-    other = _beam(space).run([other])
+    other = _grown(space, other)
     return other if space.score(best) - space.score(other) > space.policy.swap else best
 
 
@@ -346,9 +354,9 @@ def _compared(found: _Found, classes: Classes, note: Callable[[str], None]) -> S
     """The model of least cost near by, with the rivals of its effects; a better rival replaces it and is compared in turn."""
     space, final = found.space, found.space.deepened(found.final)
     for swaps_left in range(POLICY.swaps, -1, -1):
-        rivals, better = _rivals(space, final, swaps_left > 0, classes, note)
+        rivals, better = of_each_effect(space, final, swaps_left > 0, classes, note)
         if better is not None and space.hidden(better, final):
-            rivals, better = _rivals(space, final, False, classes, note)
+            rivals, better = of_each_effect(space, final, False, classes, note)
         if better is None:
             break
         final = reduced_by(space.canonical(better), _reductions(space), space.prefers, space.score)
@@ -363,37 +371,5 @@ def by_whitened_errors(selection: Selection, classes: Classes, note: Callable[[s
 
 def compared(selection: Selection, final: Fit, classes: Classes, note: Callable[[str], None]) -> Selection:
     """The selection with another model in the place of its own."""
-    rivals, _ = _rivals(selection.space, final, False, classes, note)
+    rivals, _ = of_each_effect(selection.space, final, False, classes, note)
     return replace(selection, final=final, rivals=rivals)
-
-
-def _rivals(
-    space: Moves, final: Fit, may_swap: bool, classes: Classes, note: Callable[[str], None]
-) -> tuple[dict[str, tuple[float, list[Replacement]]], Fit | None]:
-    """(rivals of each effect, a better model where there is one and a swap is allowed).
-
-    Where a record cannot tell a load or a dead band from dry friction, friction has the name: every axis has it.
-    """
-    found: dict[str, tuple[float, list[Replacement]]] = {}
-    # The effect that gains least comes first: it is the likeliest to be replaced, and then all are compared again.
-    for term in sorted(final.parameters.terms, key=lambda t: space.without(final, t.name).bic):
-        note(f"rivals of {words([term.name])}")
-        here = classes(term.name)
-        gain, rivals = rivals_of(space, final, term.name, here)
-        found[term.name] = (gain, rivals)
-        if not rivals or not may_swap:
-            continue
-        first = rivals[0]
-        contained = term.name in first.fit.parameters.term(first.effect).nested
-        needed = space.penalty if contained else space.margin if first.effect in here else space.policy.swap
-        better = first if first.behind < -needed else None
-        if better is None:
-            # Of effects that these records cannot tell apart, the simplest of a family is preferred to those outside of it.
-            others = (r for r in rivals if r.effect in here and r.behind < space.margin)
-            better = next((r for r in others if r.term.simplest and r.term.family != term.family), None)
-        if better is None and (first_of := representative(term)) != term.name:
-            # Rounding decides between effects that are the same to every record: the first of them has the name.
-            better = next((r for r in rivals if r.effect == first_of and r.behind < space.policy.swap), None)
-        if better is not None:
-            return found, better.fit
-    return found, None
