@@ -74,13 +74,15 @@ def assemble(table: LogTable, wanted: Wanted, stem: str) -> Record:
                 said.append(AS_THE_DRIVE)
             else:
                 values["velocity"] = differentiate(values["position"], dt)
+        made = ""
         if not ELECTRICAL.isdisjoint(named):
-            values["torque"], kind, note = torque_of_winding(table, wanted, values, dt)
+            values["torque"], kind, made, note = torque_of_winding(table, wanted, values, dt)
             said += [note] if note else []
         name = stem if wanted.name is None else wanted.name
         notes = (*counters.notes(), *said)
         channels: dict[str, Any] = {channel: values.get(channel) for channel in CHANNELS}
-        rec = Record(dt, name=name, torque_is=kind, torque_log=_line_of(table, wanted, values, named), notes=notes, **channels)
+        line = _line_of(table, wanted, values, named)
+        rec = Record(dt, name=name, torque_is=kind, torque_log=made or line, notes=notes, **channels)
         return rec.shifted(**wanted.shift) if wanted.shift else rec
     except RecordError as error:
         raise RecordError(f"{table.path}: {error.marked}") from None

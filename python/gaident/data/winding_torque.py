@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gaident.arguments import arg
 from gaident.data.formats.table import LogTable
-from gaident.data.torque_kind import COMMANDED, MEASURED
+from gaident.data.torque_kind import COMMANDED, MEAN, MEASURED
 from gaident.data.wanted import Wanted
 from gaident.data.winding import Winding
 from gaident.errors import ReadError
@@ -28,16 +29,27 @@ LAGS = (
 )
 
 
-def torque_of_winding(table: LogTable, wanted: Wanted, values: Mapping[str, Vector], dt: float) -> tuple[Vector, str, str]:
-    """(torque [N m], what it is, note) from voltage [V], current [A] and velocity [rad/s]; the note is "" where nothing was
-    estimated. Raises ReadError."""
+class WindingTorque(NamedTuple):
+    """values: [N m] (n,); kind and line: as `torque_is` and `torque_log` of a record; note: "" where nothing was estimated."""
+
+    values: Vector
+    kind: str
+    line: str
+    note: str
+
+
+def torque_of_winding(table: LogTable, wanted: Wanted, values: Mapping[str, Vector], dt: float) -> WindingTorque:
+    """The torque from voltage [V], current [A] and velocity [rad/s]. Raises ReadError.
+
+    A winding gives the mean torque between two lines, which the second of them contains then.
+    """
     known, current, voltage = wanted.constants, values.get("current"), values.get("voltage")
     kind = wanted.torque_is or MEASURED
     if "torque" in values:
         extra = next(name for name in ("voltage", "current") if name in values)
         raise ReadError(f"{table.path}: a torque is read, and a {extra} that would make one: leave one of the columns out")
     if current is not None and known.torque_constant is not None:
-        return known.torque_constant * current, kind, ""
+        return WindingTorque(known.torque_constant * current, kind, wanted.torque_log, "")
     if current is not None and voltage is not None:
         fit = provided("estimate_winding")(voltage, current, values["velocity"], dt)
         found: Winding = fit.winding
@@ -46,7 +58,10 @@ def torque_of_winding(table: LogTable, wanted: Wanted, values: Mapping[str, Vect
             f"The winding was estimated from voltage, current and velocity: R = {R.value:.4g} +- {R.std:.2g} Ohm, back-EMF "
             f"constant {ke.value:.4g} +- {ke.std:.2g} V s/rad, taken as the torque constant."
         )
-        return found.torque_constant * found.mean_current(current, dt), kind, note
+        kt = found.torque_constant
+        if not fit.held:  # each line is a sample of a current that goes on between the lines
+            return WindingTorque(kt * current, kind, wanted.torque_log, note)
+        return WindingTorque(_since_the_line_before(kt * found.mean_current(current, dt), kt * current[0]), kind, MEAN, note)
     if current is not None:
         raise ReadError(
             f"{table.path}: a current makes a torque with {arg('torque_constant', '...')} [N m/A], or with the voltage, from "
@@ -59,5 +74,13 @@ def torque_of_winding(table: LogTable, wanted: Wanted, values: Mapping[str, Vect
             f"{arg('resistance', '...')} [Ohm] and {arg('torque_constant', '...')} [N m/A], or name the current's column"
         )
     winding = Winding(known.resistance, known.torque_constant, known.inductance or 0.0, known.back_emf_constant)
-    torque = winding.torque(voltage, values["velocity"], dt)
-    return (torque, kind, "") if known.inductance is not None else (torque, wanted.torque_is or COMMANDED, LAGS)
+    first = winding.torque_constant * winding.current(voltage, values["velocity"], dt)[0]
+    torque = _since_the_line_before(winding.torque(voltage, values["velocity"], dt), first)
+    if known.inductance is not None:
+        return WindingTorque(torque, kind, MEAN, "")
+    return WindingTorque(torque, wanted.torque_is or COMMANDED, MEAN, LAGS)
+
+
+def _since_the_line_before(following: Vector, first: float) -> Vector:
+    """The means over the time since the line before, of those over the time after each line; first: what stands for the first."""
+    return np.concatenate([[first], following[:-1]])

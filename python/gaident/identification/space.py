@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +15,8 @@ from gaident.errors import SpaceError
 from gaident.models.drive_torque import torque_blocks
 from gaident.models.search_space import SearchSpace
 from gaident.policy.table import POLICY
+
+Vector = NDArray[np.float64]
 
 __all__ = ["derive_space"]
 
@@ -73,7 +75,7 @@ def derive_space(records: Sequence[Record], controller: PI | None) -> SearchSpac
             # The torque is a replay, which a limit inside the controller spoils; its sign is the one at which the loop stands.
             found = [abs(k) for k in (rigid, steps / energy) if np.isfinite(k) and k != 0.0]
     if not found:
-        found = _gain_on_a_spring(records, controller)
+        found = _gain_with_angle(records, controller)
     if not found:
         raise SpaceError(
             "the velocity falls when the torque rises: reverse the sign of one of them (for example by a unit of -1)"
@@ -90,29 +92,42 @@ def derive_space(records: Sequence[Record], controller: PI | None) -> SearchSpac
     )
 
 
-def _gain_on_a_spring(records: Sequence[Record], controller: PI | None) -> list[float]:
+def _gain_with_angle(records: Sequence[Record], controller: PI | None) -> list[float]:
     """[K] of an axis on a spring or under gravity, [] where the records show no such thing.
 
-        w = K int u dt - a int w dt - c int theta dt + b_0 + b_1 t,   K > 0 and c > 0
+        w = K int u dt - a int w dt - c int theta dt + b_0 + b_1 t,                        K > 0 and c > 0
+        w = K int u dt - a int w dt - c int sin(theta) dt - d int cos(theta) dt + b_0 + b_1 t,   K > 0
 
     Below its resonance such an axis is further out where the torque is larger, and its velocity falls when the torque rises.
+    A pendulum that swings far is on no spring: its gravity turns with the angle.
     """
-    gram, right = np.zeros((3, 3)), np.zeros(3)
+    of_spring = _regressed_with(records, controller, lambda angle: [angle])
+    if of_spring[0] > 0.0 and of_spring[2] > 0.0:  # no decision: a formula: the places of K and c
+        return [float(of_spring[0])]
+    of_gravity = _regressed_with(records, controller, lambda angle: [np.sin(angle), np.cos(angle)])
+    return [float(of_gravity[0])] if of_gravity[0] > 0.0 else []
+
+
+def _regressed_with(
+    records: Sequence[Record], controller: PI | None, columns: Callable[[Vector], Sequence[Vector]]
+) -> NDArray[np.float64]:
+    """(K, a, then the factors of what the torque depends on by the angle) of all records, each with b_0 and b_1 of its own."""
+    gram: NDArray[np.float64] | float = 0.0
+    right: NDArray[np.float64] | float = 0.0
     for rec in records:
         u = np.concatenate([part for _, part, _ in torque_blocks(rec, controller)])
-        angle = np.cumsum(rec.velocity) * rec.dt
-        x = np.vstack([np.cumsum(u) * rec.dt, -angle, -np.cumsum(angle) * rec.dt, rec.velocity])
+        angle = np.cumsum(rec.velocity) * rec.dt if rec.position is None else rec.position
+        moved = angle - angle[0]
+        x = np.vstack([np.cumsum(u) * rec.dt, -moved, *(-np.cumsum(c) * rec.dt for c in columns(angle)), rec.velocity])
         line = np.vstack([np.ones(len(u)), np.linspace(-1.0, 1.0, len(u))])
         line[0] /= math.sqrt(_dot(line[0], line[0]))
         line[1] /= math.sqrt(_dot(line[1], line[1]))
         for row in line:
             x -= np.array([_dot(one, row) for one in x])[:, None] * row
         products = np.array([[_dot(one, other) for other in x] for one in x])
-        gram += products[:3, :3]  # no decision: a formula: the place of a block
-        right += products[:3, 3]  # no decision: a formula: the place of a block
+        gram, right = gram + products[:-1, :-1], right + products[:-1, -1]
     sizes = np.sqrt(np.maximum(np.diag(gram), 1e-300))
-    K, _, c = np.linalg.lstsq(gram / np.outer(sizes, sizes), right / sizes, rcond=1e-12)[0] / sizes
-    return [float(K)] if K > 0.0 and c > 0.0 else []
+    return np.asarray(np.linalg.lstsq(gram / np.outer(sizes, sizes), right / sizes, rcond=1e-12)[0] / sizes)
 
 
 def _check_scales(records: Sequence[Record], controller: PI | None, only_certain: bool) -> None:

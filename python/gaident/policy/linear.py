@@ -61,6 +61,12 @@ class LinearModels:
         0.2, "samples", "standard deviation of a lag that the motion shows, at most; above, it shows none", SHIFTED
     )
     winding_sure: float = linear(5.0, "1", "standard deviations from 0, from which a resistance or inductance is shown", WINDING)
+    voltage_alike: float = linear(
+        0.05,
+        "1",
+        "of the voltage that a winding leaves: below, a held voltage is not told from one that goes on between lines",
+        WINDING,
+    )
     least_rows: int = linear(20, "1", "rows of a regression at least, half of them each way for dry friction", REGRESSION)
     standing_noise: float = linear(
         3.0, "1", "standard deviations of the velocity's noise, below which an axis stands still in a regression", REGRESSION

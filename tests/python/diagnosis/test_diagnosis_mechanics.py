@@ -11,7 +11,7 @@ import pytest
 
 import gaident as ga
 from drive_cases import random_case
-from drive_rig import skip_without_library
+from drive_rig import Plant, run_drive, skip_without_library
 from fine_integrator import FineCase, integrate
 from gaident.diagnosis.mechanics import MECHANICS, moved
 from gaident.diagnosis.selection.mechanisms import balanced_on_a_spring, evenly_damped, is_mechanism, reduced, rigid
@@ -119,6 +119,26 @@ def test_a_torque_of_the_wrong_sign_is_still_refused() -> None:
     rec = swung(0.0).records[0]
     with pytest.raises(ga.errors.SpaceError, match="reverse the sign"):
         derive_space([ga.Record(rec.dt, velocity=rec.velocity, torque=-rec.torque)], None)
+
+
+@pytest.mark.parametrize("seed", [1, 3, 8, 10])
+def test_a_pendulum_in_open_loop_has_no_wrong_sign(seed: int) -> None:
+    """It swings so far that it is on no spring, and its velocity often falls when the torque rises."""
+    plant = Plant(J=0.01, D=0.02, kp=0.0, ki=0.0, dt=2e-3)
+    torque = np.repeat(np.random.default_rng(seed).uniform(-0.7, 0.7, 40), 250)
+    effects = {"coulomb_friction": {"torque": 0.05}, "unbalance": {"amplitude": 1.0, "phase": 0.0}}
+    log = run_drive(plant, None, effects, torque=torque)
+    noise = 0.02 * np.random.default_rng(seed).standard_normal(len(torque))
+    rec = ga.Record(plant.dt, velocity=log.velocity + noise, torque=torque)
+    space = derive_space([rec], None)
+    assert space.gain[0] < 100.0 < space.gain[1]
+    if seed == 1:
+        dia = ga.diagnose(rec)
+        assert dia.verdict == "explained"
+        found = {f.effect: f.parameters for f in dia.findings}
+        assert set(found) == set(effects)
+        assert found["unbalance"]["amplitude"].value == pytest.approx(1.0, rel=0.01)
+        assert found["coulomb_friction"]["torque"].value == pytest.approx(0.05, rel=0.03)
 
 
 def test_even_damping_leaves_a_drive_of_even_bearings_alone_and_mends_one_that_is_driven() -> None:

@@ -7,7 +7,7 @@ import pytest
 
 import gaident as ga
 from drive_cases import random_case
-from drive_rig import Noise
+from drive_rig import Noise, Plant, run_drive
 from fine_integrator import FineCase, integrate
 
 CONTROLLER = ga.PI(0.0232, 1.367)
@@ -44,6 +44,30 @@ def test_what_whitened_errors_find_is_offered_to_output_errors_before_these_deci
     unbalance = dia.causes[1].parameters
     for name, value in truth.effects["unbalance"].items():
         assert abs(unbalance[name].value - value) < 3.0 * unbalance[name].std
+
+
+@pytest.mark.parametrize("profile", ["ramps", "sines"])
+def test_dry_friction_beside_a_drag(profile: str) -> None:
+    """Alone each of them pays little, as both together are nearly viscous friction: the regression tries them together."""
+    plant = Plant(J=0.01, D=0.005, kp=0.5, ki=5.0, dt=2e-3)
+    t = plant.dt * np.arange(6000)
+    rng = np.random.default_rng(2)
+    if profile == "sines":
+        command = sum(
+            np.sin(2.0 * np.pi * f * t + p) for f, p in zip(np.geomspace(0.1, 3.0, 8), rng.uniform(0.0, 6.28, 8), strict=True)
+        )
+        command *= 40.0 / np.max(np.abs(command))
+    else:
+        levels = np.repeat(rng.uniform(-40.0, 40.0, 20), 300)
+        command = np.convolve(levels, np.full(100, 0.01), "same")
+    effects = {"coulomb_friction": {"torque": 0.1}, "quadratic_drag": {"coefficient": 4e-4}}
+    log = run_drive(plant, command, effects, velocity_noise=0.02 * rng.standard_normal(len(t)))
+    torque = log.torque + 0.02 * float(np.std(log.torque)) * rng.standard_normal(len(t))
+    dia = ga.diagnose(ga.Record(plant.dt, velocity=log.velocity, torque=torque, torque_is="measured"))
+    found = {f.effect: f.parameters for f in dia.causes}
+    assert set(found) == set(effects) and dia.verdict == "explained"
+    assert found["coulomb_friction"]["torque"].value == pytest.approx(0.1, rel=0.1)
+    assert found["quadratic_drag"]["coefficient"].value == pytest.approx(4e-4, rel=0.1)
 
 
 def hidden(effects: dict[str, dict[str, float]], noise: float = 0.02) -> ga.Record:

@@ -70,6 +70,17 @@ def test_friction_by_direction_and_the_signs_of_its_parts() -> None:
     near(found, "viscous_negative", PLANT.D)
 
 
+def test_a_drag_beside_dry_friction() -> None:
+    """Dry friction is concave in the velocity and a drag convex: together they are nearly a line, and each alone pays little."""
+    drag = {"quadratic_drag": {"coefficient": 8e-4}}
+    found = ga.inverse_dynamics(record(FRICTION | drag))
+    assert found.terms == ("inertia", "viscous", "coulomb", "drag")
+    near(found, "coulomb", 0.08, 0.05)
+    near(found, "drag", 8e-4, 0.05)
+    near(found, "viscous", PLANT.D, 0.05)
+    assert ga.inverse_dynamics(record(drag)).terms == ("inertia", "viscous", "drag")
+
+
 def test_gravity_has_the_sign_and_phase_of_the_effect() -> None:
     found = ga.inverse_dynamics(record(FRICTION | {"unbalance": {"amplitude": 0.3, "phase": 0.7}}))
     assert found.terms == ("inertia", "viscous", "coulomb", "gravity")
@@ -182,7 +193,7 @@ def test_the_summary_says_what_was_found_and_how() -> None:
         ({"order": 0}, "order=0"),
         ({"decimation": 0}, "decimation=0"),
         ({"standstill": -1.0}, "standstill=-1.0"),
-        ({"terms": ("inertia", "drag")}, "terms="),
+        ({"terms": ("inertia", "wind")}, "terms="),
         ({"terms": ("offset", "coulomb_by_direction")}, "the same columns"),
         ({"axis": "round"}, "axis is 'round'"),
     ],

@@ -121,6 +121,21 @@ def test_an_inductance_that_the_samples_cannot_show_is_not_said() -> None:
             assert found.winding.resistance == pytest.approx(R, rel=0.01)
 
 
+@pytest.mark.parametrize("every", [2, 4, 8])
+def test_a_voltage_that_goes_on_between_the_lines(every: int) -> None:
+    """That of a current controller faster than the log: taken as held, R was 2.7 % too small, by 200 deviations, and L none."""
+    t = DT * np.arange(12_000)
+    run = motor(voltage=8.0 * np.sin(2.0 * np.pi * (0.2 * t + 0.2 * t**2)))
+    noise = np.random.default_rng(3).standard_normal((2, len(t)))
+    seen = [x[::every] for x in (run["voltage"], run["current"] + 0.05 * noise[0], run["velocity"] + 0.05 * noise[1])]
+    found = ga.estimate_winding(*seen, every * DT)
+    for name, true in (("resistance", R), ("back_emf_constant", KE), ("inductance", L)):
+        told = found.parameters[name]
+        assert abs(told.value - true) < max(3.0 * told.std, 0.005 * true), (name, told)
+    repeated = ga.estimate_winding(*motor().values(), DT)
+    assert repeated.held
+
+
 def test_a_current_sampled_behind_the_step_of_its_voltage() -> None:
     """Without an inductance, at the begin of each sample: U = R i + ke w of one instant."""
     w = motor(friction=0.0)["velocity"]
@@ -243,7 +258,10 @@ def test_the_torque_of_a_sampled_current_between_its_samples(here: Path) -> None
     rec = ga.read("motor.csv", {**COLUMNS, "voltage": "U", "current": "i"})
     data = np.loadtxt("motor.csv", delimiter=",", skiprows=1)
     found = ga.estimate_winding(data[:, 1] / 1e3, data[:, 2], rec.velocity, DT).winding
-    np.testing.assert_allclose(np.asarray(rec.torque), found.torque_constant * found.mean_current(data[:, 2], DT))
+    assert rec.torque is not None and rec.torque_log == "mean"  # of the time since the line before
+    mean = found.torque_constant * found.mean_current(data[:, 2], DT)
+    np.testing.assert_allclose(rec.torque[1:], mean[:-1])
+    assert rec.torque[0] == pytest.approx(found.torque_constant * data[0, 2])
 
 
 def test_the_diagnosis_finds_the_friction_behind_the_winding(here: Path, capsys: pytest.CaptureFixture[str]) -> None:

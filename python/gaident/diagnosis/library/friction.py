@@ -92,6 +92,10 @@ def _by_direction_of_regression(values: Mapping[str, float]) -> dict[str, float]
     }
 
 
+def _drag_of_regression(values: Mapping[str, float]) -> dict[str, float] | None:
+    return {"coefficient": values["drag"]} if values.get("drag", 0.0) > 0.0 else None
+
+
 ONE_TORQUE = {NO_REVERSAL: ("constant torque",)}
 
 CAUSES: tuple[Cause, ...] = (
@@ -262,6 +266,7 @@ CAUSES: tuple[Cause, ...] = (
         needs=(t.moves, t.several_speeds),
         excited_by=("triangle across zero", "repeated segment", "speeds mixed in time"),
         alike={NO_REVERSAL: ("torque that grows",)},
+        regressed=_drag_of_regression,
     ),
     linear(
         "square_root_drag", "coefficient", lambda s: 0.0, lambda s: s.torque / s.speed**0.5,

@@ -38,14 +38,14 @@ def inverse_dynamics(
 ) -> InverseDynamics:
     """Write the torque of an axis as a sum of inertia, friction, load, gravity and spring, by least squares.
 
-        u = J a + B w + C sign(w) + T + A sin(theta + phase) + K theta
+        u = J a + B w + C sign(w) + T + D w|w| + A sin(theta + phase) + K theta
 
     All channels pass the same zero-phase filter; velocity and acceleration are central differences of the position, or, where
     none is logged, the velocity and its differences. The columns and the torque are then low-passed alike and decimated.
     Samples with a velocity below three deviations of its noise, or below 0.5 % of its rms, and those within 1/cutoff of
     them, are left out: dry friction at standstill is whatever the other torques are.
     The terms are those with the smallest BIC over the number of independent samples;
-    gravity, a spring and friction by direction also have to take 5 % of the sum of squares.
+    gravity, a spring, a drag and friction by direction also have to take 5 % of the sum of squares.
     Gravity is tried from a sixth of a turn of travel on, a spring to ground in its place.
     Theory: docs/theory/inverse-dynamics.md.
 
@@ -55,7 +55,7 @@ def inverse_dynamics(
         One Record or several of one sample time; one set of parameters for all. Each needs its torque.
     terms : sequence of str, optional
         Names of terms, or None to let the criterion choose: "inertia", "viscous" or "viscous_by_direction", "coulomb" or
-        "coulomb_by_direction", "offset", "gravity", "spring".
+        "coulomb_by_direction", "offset", "drag", "gravity", "spring".
     cutoff_hz : float, optional
         Corner of the filter [Hz].
         None: the highest at which noise is at most 0.1 % of the acceleration's power, at most a tenth of the sample rate.
@@ -236,9 +236,13 @@ def _fitted(rows: Sequence[Rows], terms: tuple[str, ...]) -> tuple[Vector, int]:
 
 
 def _exists(terms: tuple[str, ...], theta: Vector) -> bool:
-    """Whether an axis can be so: its inertia, and the stiffness of a spring, are positive."""
+    """Whether an axis can be so: inertia, dry friction, drag and the stiffness of a spring are positive.
+
+    Beside a drag viscous friction is, too: a drag with less than none is friction that falls with the speed.
+    """
     values = dict(zip((p.name for t in terms for p in TERMS[t].parameters), theta, strict=True))
-    return all(values.get(name, 1.0) > 0.0 for name in ("inertia", "spring"))
+    positive = ("inertia", "coulomb", "drag", "spring", *(("viscous",) if "drag" in terms else ()))
+    return all(values.get(name, 1.0) > 0.0 for name in positive)
 
 
 def _count(terms: tuple[str, ...]) -> int:
@@ -250,7 +254,7 @@ def _material(best: tuple[str, ...], squares: dict[tuple[str, ...], float]) -> t
 
     A misfit that returns with every stroke looks like many independent samples of a small spring; the criterion does not know.
     """
-    for simpler in (_without_angle, _common):
+    for simpler in (_without_angle, _without_drag, _common):
         other = simpler(best)
         if other in squares and squares[best] > (1.0 - POLICY.material_column) * squares[other]:
             best = other
@@ -259,6 +263,11 @@ def _material(best: tuple[str, ...], squares: dict[tuple[str, ...], float]) -> t
 
 def _without_angle(terms: tuple[str, ...]) -> tuple[str, ...]:
     return tuple(name for name in terms if name not in ("gravity", "spring"))
+
+
+def _without_drag(terms: tuple[str, ...]) -> tuple[str, ...]:
+    """With viscous friction alone in the place of a drag."""
+    return tuple(name for name in TERMS if name in {*terms, "viscous"} - {"drag"}) if "drag" in terms else terms
 
 
 def _common(terms: tuple[str, ...]) -> tuple[str, ...]:

@@ -1,6 +1,6 @@
 """What the torque of an axis is made of, as columns of a regression, and which sets of them are compared.
 
-    u = J a + B w + C sign(w) + T + A sin(theta + phase) + K theta
+    u = J a + B w + C sign(w) + T + D w|w| + A sin(theta + phase) + K theta
 
     by direction:  B w = B+ w (w > 0) + B- w (w < 0),   C sign(w) = C+ (w > 0) - C- (w < 0)
     gravity:       A sin(theta + phase) = A cos(phase) sin(theta) + A sin(phase) cos(theta)
@@ -65,6 +65,7 @@ TERMS: dict[str, TorqueTerm] = {
         (_force("coulomb_positive"), _force("coulomb_negative")),
     ),
     "offset": TorqueTerm(lambda m, _: [np.ones_like(m.velocity)], (_force("offset"),)),
+    "drag": TorqueTerm(lambda m, _: [m.velocity * np.abs(m.velocity)], (Coefficient("drag", "N m s^2/rad^2", "N s^2/m^2"),)),
     "gravity": TorqueTerm(
         lambda m, _: [np.sin(m.position), np.cos(m.position)],
         (_force("gravity_amplitude"), Coefficient("gravity_phase", "rad", "rad")),
@@ -83,13 +84,17 @@ COLUMNS: dict[str, TorqueTerm] = TERMS | {
 FRICTION = ((), ("viscous",), ("coulomb",), ("viscous", "coulomb"))
 BY_DIRECTION = ("viscous_by_direction", "coulomb_by_direction")
 WITH_CONSTANT = (*((*f, "offset") for f in FRICTION), BY_DIRECTION)
-CHOICES: tuple[tuple[str, ...], ...] = (
-    *(("inertia", *f) for f in (*FRICTION, *WITH_CONSTANT)),
-    *(("inertia", *f, "gravity") for f in (*FRICTION, *WITH_CONSTANT)),
-    *(("inertia", *f, "spring") for f in WITH_CONSTANT),
+LOADS: tuple[tuple[tuple[str, ...], tuple[tuple[str, ...], ...]], ...] = (
+    ((), (*FRICTION, *WITH_CONSTANT)),
+    (("gravity",), (*FRICTION, *WITH_CONSTANT)),
+    (("spring",), WITH_CONSTANT),
 )
-"""The sets of terms that the criterion compares: friction and load alone, with gravity, or with a spring to ground, whose rest
-angle needs the constant."""
+CHOICES: tuple[tuple[str, ...], ...] = (
+    *(("inertia", *f, *load) for load, frictions in LOADS for f in frictions),
+    *(("inertia", *f, "drag", *load) for load, frictions in LOADS for f in frictions if f != BY_DIRECTION),
+)
+"""The sets of terms that the criterion compares: friction and a constant alone, with gravity, or with a spring to ground, whose
+rest angle needs the constant; each without a drag and with one, which friction by direction has no room for."""
 
 
 def columns_of(terms: tuple[str, ...], motion: Motion) -> Matrix:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -23,6 +23,7 @@ from gaident.results.estimate import Estimate
 __all__ = ["WindingFit", "estimate_winding"]
 
 Vector = NDArray[np.float64]
+Matrix = NDArray[np.float64]
 
 PASSES = 3  # no decision: of a solver
 NAMES = {"resistance": "Ohm", "back_emf_constant": "V s/rad", "inductance": "H", "offset": "V"}
@@ -42,6 +43,8 @@ class WindingFit:
         The rms of the voltage that is left over that of the voltage [1].
     cutoff_hz : float
         Corner of the zero-phase filter that all three passed [Hz].
+    held : bool
+        Whether the voltage was taken as held from line to line; else it goes on between the lines.
 
     See Also
     --------
@@ -52,6 +55,7 @@ class WindingFit:
     parameters: Mapping[str, Estimate]
     error: float
     cutoff_hz: float
+    held: bool = True
 
     def summary(self) -> str:
         """Return the values with their deviations, a line each."""
@@ -77,6 +81,12 @@ def estimate_winding(
     current is sampled at the end of the sample's voltage, and 0 where it is at its begin.
     The winding has the inductance where 2c is above R by `winding_sure` deviations of the difference: of that L is a logarithm,
     so that an L of an eighth of a sample or less cannot be told from none, whatever the deviation of L.
+    Of a voltage that goes on between the lines, as that of a current controller faster than the log, each line is a sample:
+
+        (U(n) + U(n+1))/2 = R (i(n) + i(n+1))/2 + ke (w(n) + w(n+1))/2 + (L/dt) (i(n+1) - i(n)) + U0
+
+    A voltage that most lines repeat is held. Of another one the equation counts that leaves the smaller share of the voltage, and
+    the difference of both is in the deviations where the shares are alike to within `voltage_alike`.
     The deviations know that neighbouring errors are alike (Newey and West 1987).
 
     Parameters
@@ -91,7 +101,7 @@ def estimate_winding(
     Returns
     -------
     WindingFit
-        Frozen: `winding`, `parameters`, `error`, `cutoff_hz`, `summary()`.
+        Frozen: `winding`, `parameters`, `error`, `cutoff_hz`, `held`, `summary()`.
 
     Raises
     ------
@@ -127,27 +137,17 @@ def _estimated(U: Vector, i: Vector, w: Vector, rec: Record, cutoff_hz: float | 
     if not 0.0 < cutoff < 0.5 / rec.dt:  # no decision: a formula: the Nyquist frequency
         raise RecordError(f"cutoff_hz={cutoff_hz!r}: give a corner between 0 and {0.5 / rec.dt:g} Hz, or None")
     factor = decimation_of(None, cutoff, rec.dt)
+    repeated = float(np.mean(np.diff(U) == 0.0)) > 0.5  # no decision: a formula: most of them
     U, i, w = (low_passed(x, rec.dt, cutoff, ORDER) for x in (U, i, w))
-    U, later = U[:-1], 0.5
-    for _ in range(PASSES):
-        columns = (0.5 * (i[1:] + i[:-1]), (1.0 - later) * w[:-1] + later * w[1:], np.diff(i), np.ones(len(U)))
-        X, y = (np.column_stack([decimated(np.ascontiguousarray(c), factor) for c in part])[2:-2] for part in (columns, (U,)))
-        if len(X) < POLICY.least_rows:
-            raise RecordError(f"only {len(X)} rows are left of {len(w)} samples behind {cutoff:g} Hz; give a longer record")
-        theta, _ = solve(X, y[:, 0])
-        left = y[:, 0] - X @ theta
-        later = _later(float(theta[0]), float(theta[2]))
-    R, c = float(theta[0]), float(theta[2])
-    cov = covariance([X], [left])
-    std = np.sqrt(np.diag(cov))
-    excess, unsure = 2.0 * c - R, float(np.sqrt(4.0 * cov[2, 2] - 4.0 * cov[0, 2] + cov[0, 0]))
-    theta[2] = _inductance(R, excess, rec.dt)
-    std[2] = 0.5 * (_inductance(R, excess + unsure, rec.dt) - _inductance(R, excess - unsure, rec.dt))
+    held, straight = _held(U, i, w, rec.dt, factor), _straight(U, i, w, rec.dt, factor)
+    of, still = (held, True) if repeated or held.error <= straight.error else (straight, False)
+    if not repeated and max(held.error, straight.error) < (1.0 + POLICY.voltage_alike) * of.error:
+        of = replace(of, stds=np.hypot(of.stds, np.abs(held.values - straight.values)))
     found = {
         name: Estimate(float(x), float(s), unit, identifiable=bool(s < abs(x)))
-        for (name, unit), x, s in zip(NAMES.items(), theta, std, strict=True)
+        for (name, unit), x, s in zip(NAMES.items(), of.values, of.stds, strict=True)
     }
-    found["inductance"] = replace(found["inductance"], identifiable=excess > unsure)
+    found["inductance"] = replace(found["inductance"], identifiable=of.deviations > 1.0)
     for name in ("resistance", "back_emf_constant"):
         e = found[name]
         if not e.value > POLICY.winding_sure * e.std:
@@ -156,9 +156,53 @@ def _estimated(U: Vector, i: Vector, w: Vector, rec: Record, cutoff_hz: float | 
                 "do not determine it; check their units and signs, and give a motion with load and speed apart, such as "
                 "reversals and ramps"
             )
-    shown = excess > POLICY.winding_sure * unsure  # not L by its own deviation: near 0 it is a logarithm of the excess
+    shown = of.deviations > POLICY.winding_sure
     winding = Winding(found["resistance"].value, found["back_emf_constant"].value, found["inductance"].value if shown else 0.0)
-    return WindingFit(winding, found, float(np.sqrt(left @ left / (y[:, 0] @ y[:, 0]))), cutoff)
+    return WindingFit(winding, found, of.error, cutoff, still)
+
+
+@dataclass(frozen=True)
+class _Fitted:
+    """values, stds: R, ke, L, U0. deviations: by how many the inductance is above 0. error: share of the voltage that is left."""
+
+    values: Vector
+    stds: Vector
+    deviations: float
+    error: float
+
+
+def _regressed(columns: Sequence[Vector], of: Vector, factor: int) -> tuple[Vector, Matrix, float]:
+    """(coefficients, their covariance, share of the voltage that is left)."""
+    X, y = (np.column_stack([decimated(np.ascontiguousarray(c), factor) for c in part])[2:-2] for part in (columns, (of,)))
+    if len(X) < POLICY.least_rows:
+        raise RecordError(f"only {len(X)} rows are left of {len(of) + 1} samples behind the filter; give a longer record")
+    theta, _ = solve(X, y[:, 0])
+    left = y[:, 0] - X @ theta
+    return theta, covariance([X], [left]), float(np.sqrt(left @ left / (y[:, 0] @ y[:, 0])))
+
+
+def _held(U: Vector, i: Vector, w: Vector, dt: float, factor: int) -> _Fitted:
+    """Under a voltage that is held over each sample."""
+    later = 0.5  # no decision: of a solver: a start
+    for _ in range(PASSES):
+        columns = (0.5 * (i[1:] + i[:-1]), (1.0 - later) * w[:-1] + later * w[1:], np.diff(i), np.ones(len(i) - 1))
+        theta, cov, error = _regressed(columns, U[:-1], factor)
+        later = _later(float(theta[0]), float(theta[2]))
+    R, c = float(theta[0]), float(theta[2])
+    std = np.sqrt(np.diag(cov))
+    # Not L by its own deviation: near 0 it is a logarithm of the excess.
+    excess, unsure = 2.0 * c - R, float(np.sqrt(4.0 * cov[2, 2] - 4.0 * cov[0, 2] + cov[0, 0]))
+    theta[2] = _inductance(R, excess, dt)
+    std[2] = 0.5 * (_inductance(R, excess + unsure, dt) - _inductance(R, excess - unsure, dt))
+    return _Fitted(theta, std, excess / unsure if unsure > 0.0 else np.inf * excess, error)
+
+
+def _straight(U: Vector, i: Vector, w: Vector, dt: float, factor: int) -> _Fitted:
+    """Under a voltage that goes straight from line to line."""
+    columns = (0.5 * (i[1:] + i[:-1]), 0.5 * (w[1:] + w[:-1]), np.diff(i) / dt, np.ones(len(i) - 1))
+    theta, cov, error = _regressed(columns, 0.5 * (U[1:] + U[:-1]), factor)
+    std = np.sqrt(np.diag(cov))
+    return _Fitted(theta, std, float(theta[2] / std[2]) if std[2] > 0.0 else np.inf * float(theta[2]), error)
 
 
 def _inductance(R: float, excess: float, dt: float) -> float:
