@@ -48,6 +48,7 @@ from gaident.estimation import least_squares as ls
 from gaident.estimation.criterion import gained
 from gaident.estimation.noise_model import WHITE
 from gaident.estimation.objective import Fit, Hypothesis
+from gaident.estimation.parameterisation import Parameterisation
 from gaident.estimation.prediction import OpenLoop
 from gaident.estimation.projection import WORST, orthonormal_rows
 from gaident.estimation.term import Term
@@ -195,13 +196,28 @@ class Moves(Repeated):
         if turning:  # the part of the simple effect that changes with the angle is linear, and is added to it
             test.replace(source, simple.name, Hypothesis(parameters, source.predictor), x, turning)
             wanted = [t for t in wanted if not t.harmonic]
-        for friction in {max(level, LEAST * torque), max(level, MISSED * torque)}:
+        levels = [(friction, x) for friction in {max(level, LEAST * torque), max(level, MISSED * torque)}]
+        falling = self._undamped(parameters, x, level)
+        for friction, start in levels + falling:
             scales = replace(parameters.scales, friction=friction)
             bare = Hypothesis(replace(parameters, scales=scales), source.predictor)
             if source is now:
-                test.replace(source, simple.name, bare, x, wanted)
+                test.replace(source, simple.name, bare, start, wanted)
             else:
-                test.add(bare, x, wanted)
+                test.add(bare, start, wanted)
+
+    @staticmethod
+    def _undamped(parameters: Parameterisation, x: NDArray[np.float64], level: float) -> list[tuple[float, NDArray[np.float64]]]:
+        """[(friction at the largest speed, x without damping)] of one mass whose damping is below 0; else [].
+
+        Beside dry friction of one size a friction that falls with the speed is a damping below 0: C + B w, half of C at least.
+        """
+        model = parameters.linear(x)
+        if parameters.kind != "one mass" or not (pole := float(model.poles[0].real)) > 0.0:
+            return []
+        friction = max(level - pole / model.gain * parameters.scales.speed, 0.5 * level)  # no decision: a start
+        base = parameters.base_vector(replace(model, poles=(0.0,)))
+        return [(max(friction, LEAST * parameters.scales.torque), np.concatenate([base, x[len(base) :]]))]
 
     def ground(self, fit: Fit) -> list[Fit]:
         """One mass with its effects, on a spring to the ground; none where the linear test gives a spring too little.

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from gaident.diagnosis.library.terms import LIBRARY
+from gaident.diagnosis.selection.mechanisms import drives_itself
 from gaident.estimation.dataset import DataSet
 from gaident.estimation.noise_model import WHITE
 from gaident.estimation.objective import Fit, Innovations, Objective
@@ -59,8 +60,11 @@ class NoiseLevel:
         return self.data.noise_of(self.objective.error(fit))
 
     def noise_in_errors(self, fit: Fit) -> float:
-        """Rms that noise leaves in the errors of a fit: that of the velocity, and of a measured torque behind the model."""
-        if not self.hears_torque_noise(fit):
+        """Rms that noise leaves in the errors of a fit: that of the velocity, and of a measured torque behind the model.
+
+        A mechanism that drives itself has no level of its own: noise would grow in it without end.
+        """
+        if not self.hears_torque_noise(fit) or drives_itself(fit):
             return self.noise_beside(fit)
         key = "noise in errors", fit.hypothesis, fit.x.tobytes()
         return self.objective.once(key, lambda: self._with_torque_noise(fit))
