@@ -271,18 +271,22 @@ def _of_motion(lag: TorqueLag, refuted: bool) -> tuple[Mapping[str, int], Text]:
     """(channel -> samples by which it is moved, note) of a torque in open loop, where no law of a controller proves anything.
 
     A motion that comes whole samples before its torque is the log's: no axis does that, and there is nothing to find in it.
-    By a part of a sample it is a filter of the torque, or a torque that goes on between the lines; a motion behind its torque
-    may be a delay of the drive. Neither is moved.
+    Up to half a sample more is a torque that goes on between the lines, as that of a controller faster than the log.
+    Another part of a sample is a filter of the torque; a motion behind its torque may be a delay of the drive. Neither is moved.
     """
     if not _said(lag):
         return {}, Text("")
-    whole = round(lag.lag)
-    if lag.lag > 0.0 and _whole(lag):
-        text = (
+    if whole := _written_late(lag):
+        moved = say(
             "The motion comes {} before the logged {torque} that makes it, which no axis does: the log wrote the {torque} {} "
-            "late (or the velocity early). The {torque} was moved by {:+d}, and everything below is of that."
+            "late (or the velocity early). The {torque} was moved by {:+d}, and everything below is of that.",
+            _samples(lag.lag),
+            _samples(whole),
+            -whole,
         )
-        return {"torque": -whole}, say(text, _samples(lag.lag), _samples(whole), -whole)
+        more = "{} The part of a sample that is left is what a {torque} that goes on between the lines comes to."
+        return {"torque": -whole}, moved if _whole(lag) else say(more, moved)
+    whole = round(lag.lag)
     remedy = f"where you know that it is the log, read it with shift torque={-whole}. Nothing was moved."
     if lag.lag > 0.0:
         text = (
@@ -303,6 +307,14 @@ def _whole(lag: TorqueLag) -> bool:
     apart = abs(lag.lag - round(lag.lag))
     told = apart + POLICY.contradiction * lag.std < 0.5  # no decision: rounding: the nearest whole number
     return apart < POLICY.lag_whole and told
+
+
+def _written_late(lag: TorqueLag) -> int:
+    """By how many whole samples a log wrote a torque late: its motion comes that and up to half a sample before it; else 0."""
+    whole = int(np.floor(lag.lag + POLICY.lag_whole))
+    rest, unsure = lag.lag - whole, POLICY.contradiction * lag.std
+    sure = rest - unsure < 0.5 and unsure < POLICY.lag_whole  # no decision: a formula: a straight line is half a sample late
+    return whole if whole >= 1 and sure else 0
 
 
 def _said(lag: TorqueLag) -> bool:

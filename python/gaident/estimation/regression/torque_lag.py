@@ -7,6 +7,7 @@
 
 g is the gravity or the spring that the regression of the record chooses (`inverse_dynamics`), else 0.
 All channels pass the filter of the regression, and the low-pass of its decimation; but every sample is kept.
+In a log of means u(n) is the mean of the time after line n, which stands in the next line: such a log is not late.
 No row contains what lies before or behind the record: continued beyond a jump at its start, torque and motion do not fit.
 With one row in ten the lag depended on which of them the log began with, by 0.05 to 0.1 samples where the load swings.
 A lightly damped resonance above the filter's corner turns no phase, so an elastic axis has the lag of a rigid one.
@@ -29,6 +30,7 @@ from gaident.estimation.regression.motion import ORDER, cutoff_of, motion_of
 from gaident.estimation.regression.regression import solve
 from gaident.estimation.regression.rows import decimation_of
 from gaident.estimation.regression.torque_terms import columns_of
+from gaident.models.held_torque import held_mean
 from gaident.policy.table import POLICY
 
 __all__ = ["TorqueLag", "torque_lag"]
@@ -55,7 +57,7 @@ def torque_lag(rec: Record, cutoff_hz: float | None = None, axis: str = "rotary"
     """
     if rec.torque is None:
         return None
-    rec = rec[: POLICY.lag_samples]
+    rec = held_mean(rec[: POLICY.lag_samples])
     assert rec.torque is not None
     cutoff = min(cutoff_of(rec, ORDER), np.inf if cutoff_hz is None else cutoff_hz)
     factor = decimation_of(None, cutoff, rec.dt)
