@@ -85,8 +85,9 @@ def estimate_winding(
 
         (U(n) + U(n+1))/2 = R (i(n) + i(n+1))/2 + ke (w(n) + w(n+1))/2 + (L/dt) (i(n+1) - i(n)) + U0
 
-    A voltage that most lines repeat is held. Of another one the equation counts that leaves the smaller share of the voltage, and
-    the difference of both is in the deviations where the shares are alike to within `voltage_alike`.
+    A voltage that most lines repeat is held.
+    Of another one the equation counts that leaves the smaller share of the voltage, and the difference of both is in the deviations
+    where the shares are alike to within `voltage_alike`.
     The deviations know that neighbouring errors are alike (Newey and West 1987).
 
     Parameters
