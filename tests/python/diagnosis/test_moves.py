@@ -882,7 +882,7 @@ def test_rivals_are_in_the_order_after_their_search(monkeypatch: pytest.MonkeyPa
         replace(bench.fit(replace(IMPACTS, name=name)), bic=gap.bic + behind) for name, behind in (("b", 1.0), ("c", 2.0))
     )
     space = type(bench.space)
-    monkeypatch.setattr(space, "add", lambda self, fit: [near, far])
+    monkeypatch.setattr(space, "extended", lambda self, fit: [near, far])
     monkeypatch.setattr(space, "quiet", lambda self, fit: False)
     monkeypatch.setattr(space, "deepened", lambda self, fit: replace(far, bic=gap.bic - 5.0) if fit is far else fit)
     assert [r.effect for r in rivals_of(bench.space, gap, "gap")[1]] == ["c", "b"]

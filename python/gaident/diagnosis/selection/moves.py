@@ -94,7 +94,11 @@ class Moves(Repeated):
             return []
         key = "add", now.key, self.allowed
         self.grown.note(self.objective, self._model(now), now)
-        return self.objective.once(key, lambda: self._best(now, [*self.ground(now), *self.with_a_load(now), *self._add(now)]))
+        return self.objective.once(key, lambda: self._best(now, [*self.ground(now), *self.with_a_load(now), *self.extended(now)]))
+
+    def extended(self, now: Fit) -> list[Fit]:
+        """Those of them that have the mechanism of the model, or one that took an effect's place."""
+        return self.objective.once(("extended", now.key, self.allowed), lambda: self._add(now))
 
     def known(self, fit: Fit) -> Fit:
         """A fit of the same model that was grown already, unless it is worse by more than `swap`: what it grows to is known."""

@@ -70,7 +70,7 @@ def rivals_of(space: Moves, final: Fit, effect: str, equivalent: Collection[str]
     found = []
     turned = space.at_other_side(final, term)
     elsewhere = "" if turned is None else turned.parameters.terms[-1].name
-    others = [f for f in space.add(less) if _only_new(f, final) not in ("", elsewhere)]
+    others = [f for f in space.extended(less) if _only_new(f, final) not in ("", elsewhere)]
     grown = {_only_new(f, final) for f in others}
     others += [f for f in space.as_other_wave(final, term) if _only_new(f, final) not in grown]
     missed = term.impacts and _missed(space, final, less)

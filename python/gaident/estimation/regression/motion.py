@@ -68,9 +68,9 @@ def motion_of(rec: Record, cutoff_hz: float, order: int, standstill: float | Non
 
 def _beside(still: NDArray[np.bool_], width: int) -> NDArray[np.bool_]:
     """`still`, and `width` samples before and after: so far the filters carry the unknown friction into the motion."""
-    from scipy.ndimage import binary_dilation
+    from scipy.ndimage import maximum_filter1d
 
-    return np.asarray(binary_dilation(still, np.ones(2 * width + 1)))
+    return np.asarray(maximum_filter1d(still, 2 * width + 1, mode="constant", cval=False))
 
 
 def low_passed(x: Vector, dt: float, cutoff_hz: float, order: int) -> Vector:

@@ -86,8 +86,8 @@ def estimate_winding(
         (U(n) + U(n+1))/2 = R (i(n) + i(n+1))/2 + ke (w(n) + w(n+1))/2 + (L/dt) (i(n+1) - i(n)) + U0
 
     A voltage that most lines repeat is held.
-    Of another one the equation counts that leaves the smaller share of the voltage, and the difference of both is in the deviations
-    where the shares are alike to within `voltage_alike`.
+    Of another one the equation counts that leaves the smaller share of the voltage.
+    Where both leave alike shares, to within `voltage_alike`, their difference is in the deviations.
     The deviations know that neighbouring errors are alike (Newey and West 1987).
 
     Parameters
