@@ -193,10 +193,30 @@ def _by_output_errors(output: ByOutputErrors, bases: Sequence[Fit], note: Callab
     if rigid is not None and rigid.effects and space.quiet(rigid) and space.small_unwhitened(rigid):
         final = _grown(space, rigid)
         return _Found(space, space.bare(final), final)
-    base, final = _explored(task, space, [task.objective.rescored(f) for f in starts])
+    bases = [task.objective.rescored(f) for f in starts]
+    base, final = _explored(task, space, bases)
     if rigid is not None:
         final = _improved(space, rigid, final)
-    return _Found(space, base, base).of(final)
+    return _by_noise(output, _Found(space, base, base).of(final), bases)
+
+
+def _by_noise(output: ByOutputErrors, found: _Found, bases: Sequence[Fit]) -> _Found:
+    """What was found or, where it leaves more than noise, what grows from a model with one effect that leaves noise.
+
+    Slow errors of a linear model are so few independent samples that no effect is worth its cost beside two masses.
+    The errors of a model that leaves noise are as many as noise has, and these count then.
+    """
+    space = found.space
+    if space.is_noise(found.final):
+        return found
+    grown = [f for b in bases for f in space.add(b) if space.is_noise(f)]
+    if not grown:
+        return found
+    least = min(grown, key=lambda f: f.cost)
+    space = output.informed(effective_samples(space.objective.unwhitened_errors(least))).space()
+    best, other = (space.objective.rescored(f) for f in (found.final, least))
+    final = _improved(space, other, best)
+    return found if final is best else _Found(space, space.bare(final), final)
 
 
 def _informed(output: ByOutputErrors, linear: Fit, axis: Fit | None) -> Task:
