@@ -27,6 +27,7 @@ __all__ = ["Unwrapper", "continued", "overflow", "wrapped_words"]
 
 Vector = NDArray[np.float64]
 
+BLOCK = 1 << 16  # no decision: memory; values that are looked at together
 _USUAL = (1.0, 100.0, 360.0, 3600.0, 36000.0, 360000.0, 1000.0, 2.0 * math.pi, *(float(2**k) for k in range(8, 33)))
 _INTEGERS = (float(2**16), float(2**32))  # of an integer that overflows
 
@@ -35,13 +36,13 @@ def _clean(x: Vector, usual: Sequence[float]) -> tuple[NDArray[np.intp], Vector]
     """(n of each clean jump from x(n) to x(n+1), what it lacks of M: the mean step beside it)."""
     if len(x) < 4:  # no decision: how many values a jump with a step on either side has
         return np.zeros(0, dtype=np.intp), np.zeros(0)
-    d = np.diff(x)
-    at = np.flatnonzero(np.abs(d[1:-1]) >= POLICY.wrap_jump * float(np.ptp(x))) + 1
-    size, before, after = np.abs(d[at]), d[at - 1], d[at + 1]
+    at = _jumps(x)
+    jump, before, after = (x[at + k + 1] - x[at + k] for k in (0, -1, 1))
+    size = np.abs(jump)
     beside = np.maximum(np.abs(before), np.abs(after))
     clean = (beside <= POLICY.wrap_beside * size) & (np.abs(before - after) <= POLICY.wrap_alike * size)
     lacking = 0.5 * np.abs(before + after)
-    sign = -np.sign(d[at])
+    sign = -np.sign(jump)
     steady = (
         (sign * before > 0.0) & (sign * after > 0.0) & (np.minimum(np.abs(before), np.abs(after)) >= POLICY.wrap_steady * beside)
     )
@@ -51,6 +52,17 @@ def _clean(x: Vector, usual: Sequence[float]) -> tuple[NDArray[np.intp], Vector]
     went = sign * (x[np.minimum(at + 1 + POLICY.wrap_reach, len(x) - 1)] - x[at + 1])
     clean &= steady | (known & (came >= 0.0) & (went >= 0.0) & (came + went > 0.0))
     return at[clean], lacking[clean]
+
+
+def _jumps(x: Vector) -> NDArray[np.intp]:
+    """n of each step from x(n) to x(n+1) of nearly the whole range, with a step on either side; a long signal part by part."""
+    least, found = POLICY.wrap_jump * float(np.ptp(x)), [np.zeros(0, dtype=np.intp)]
+    if not least > 0.0:
+        return found[0]
+    for start in range(1, len(x) - 2, BLOCK):
+        steps = np.diff(x[start : min(start + BLOCK, len(x) - 2) + 1])
+        found.append(np.flatnonzero(np.abs(steps) >= least) + start)
+    return np.concatenate(found)
 
 
 class Unwrapper:

@@ -134,9 +134,9 @@ def inverse_dynamics(
     fits = {c: _fitted(rows, c) for c in possible}
     lefts = {c: [r.torque - r.of(c) @ theta for r in rows] for c, (theta, _) in fits.items()}
     squares = {c: sum(float(np.sum(x**2)) for x in left) for c, left in lefts.items()}
-    n_eff = _effective(lefts, fits)
     if asked is None:
         possible = [c for c in possible if _exists(c, fits[c][0])] or possible
+    n_eff = _effective({c: lefts[c] for c in possible}, fits)
     squares = {c: squares[c] for c in possible}
     scores = {c: bic(squares[c] / count, n_eff, _count(c)) for c in possible}
     chosen = _material(min(possible, key=lambda c: (scores[c], len(c))), squares)
@@ -238,10 +238,11 @@ def _fitted(rows: Sequence[Rows], terms: tuple[str, ...]) -> tuple[Vector, int]:
 def _exists(terms: tuple[str, ...], theta: Vector) -> bool:
     """Whether an axis can be so: inertia, dry friction, drag and the stiffness of a spring are positive.
 
-    Beside a drag viscous friction is, too: a drag with less than none is friction that falls with the speed.
+    Viscous friction is, too, but beside dry friction alone, which may fall with the speed.
     """
     values = dict(zip((p.name for t in terms for p in TERMS[t].parameters), theta, strict=True))
-    positive = ("inertia", "coulomb", "drag", "spring", *(("viscous",) if "drag" in terms else ()))
+    falls = "coulomb" in terms and "drag" not in terms
+    positive = ("inertia", "coulomb", "drag", "spring", *(() if falls else ("viscous",)))
     return all(values.get(name, 1.0) > 0.0 for name in positive)
 
 
