@@ -205,9 +205,10 @@ def _by_noise(output: ByOutputErrors, found: _Found, bases: Sequence[Fit]) -> _F
 
     Slow errors of a linear model are so few independent samples that no effect is worth its cost beside two masses.
     The errors of a model that leaves noise are as many as noise has, and these count then.
+    Of a torque that was measured, whose noise is known; else the search under innovations counts all samples.
     """
     space = found.space
-    if space.is_noise(found.final):
+    if not space.data.torque_measured or space.is_noise(found.final):
         return found
     grown = [f for b in bases for f in space.add(b) if space.is_noise(f)]
     if not grown:
