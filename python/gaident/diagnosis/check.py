@@ -7,11 +7,12 @@ They contradict each other where
     |a - b| > check_deviations sqrt(s_a^2 + s_b^2),   |a - b| > check_share max(|a|, |b|),
 
 and, for a torque, |a - b| > check_torque of the torque's rms.
-The second and third say that the difference matters. Then a note names both.
+The second and third say that the difference matters.
 
-By its filter, and by a torque held over each sample, the regression is off by more than its deviation on clean records too.
-So a smaller difference is said in a weaker sentence only where the first line holds for b - (c - a) as well,
-c what the regression says of records that the model itself made, under the same torques.
+By its filter, by a torque held over each sample, and by what it has no term for (friction that falls with the speed), the
+regression is off on the records of a right model too.
+So all of it must hold for b - (c - a) as well, c what the regression says of records that the model itself made, under the same
+torques. Then a note names both; where only the first line holds, it is a weaker sentence.
 
 The force errors of both are compared by the same rule: a note says that the diagnosed model, a, loses where
 
@@ -98,12 +99,17 @@ def checked(data: DataSet, gains: Gains, model: Model, mechanics: Mapping[str, E
     before, after, second, better = _forces(records, gains, found)
     if found is None:
         return replace(nothing, before=before, after=after, reason=_reason(effects, driven))
-    comparisons = tuple(_compared(found, mechanics, effects, after.torque_rms or 0.0, bool(effects_before_the_shaft(model))))
+    rows = _compared(found, mechanics, effects)
+    asked = any(_surely(c, c.diagnosis) for c in rows)
+    own = _of_own_records(found, model, records) if asked else {}
+    ahead, torque = bool(effects_before_the_shaft(model)), after.torque_rms or 0.0
+    rows = [replace(c, of_model=own.get(c.name)) for c in rows]
+    comparisons = tuple(replace(c, differs=not ahead and _contradicts(c, torque)) for c in rows)
     verdict = _verdict(after.force_error, second)
     notes = tuple(_sentence(c) for c in comparisons if c.differs)
     lost = _lost(after, second, better)
     notes = (*notes[:-1], joined("", (notes[-1], verdict))) if notes else lost
-    notes = (*notes, *_smaller(found, comparisons, model, records))
+    notes = (*notes, *_smaller(comparisons))
     return Check(found, second, comparisons, before, after, notes, _reason(effects, driven), better, bool(lost))
 
 
@@ -193,22 +199,31 @@ def _made(model: Model, records: Sequence[Record]) -> tuple[Record, ...] | None:
     return tuple(made)
 
 
-def _compared(
-    found: InverseDynamics, mechanics: Mapping[str, Estimate], effects: Effects, torque: float, ahead: bool
-) -> list[Comparison]:
-    """What both have; ahead: effects stand between the logged torque and the shaft, of which the regression knows nothing."""
+def _compared(found: InverseDynamics, mechanics: Mapping[str, Estimate], effects: Effects) -> list[Comparison]:
+    """What both have, not judged yet."""
     own, other = _of_diagnosis(mechanics, effects), _of_regression(found)
-    rows = []
-    for name, unit in NONE.items():
-        a, b = own.get(name), other.get(name)
-        if a is None or b is None or a.value == b.value == 0.0:
-            continue
-        apart = abs(a.value - b.value)
-        size = max(abs(a.value), abs(b.value))
-        surely = apart > POLICY.check_deviations * math.hypot(a.std, b.std)
-        matters = apart > POLICY.check_share * size and (unit != "N m" or apart > POLICY.check_torque * torque)
-        rows.append(Comparison(name, a, b, surely and matters and not ahead))
-    return rows
+    both = [(name, own[name], other[name]) for name in NONE if name in own and name in other]
+    return [Comparison(name, a, b, False) for name, a, b in both if not a.value == b.value == 0.0]
+
+
+def _surely(c: Comparison, of_model: Estimate) -> bool:
+    """Whether the regression says something else than this, beyond the deviations of both methods."""
+    return abs(c.regression.value - of_model.value) > POLICY.check_deviations * math.hypot(c.diagnosis.std, c.regression.std)
+
+
+def _contradicts(c: Comparison, torque: float) -> bool:
+    """Whether the two contradict each other; torque: its rms [N m]."""
+
+    def apart(of_model: Estimate) -> bool:
+        a, b = of_model.value, c.regression.value
+        matters = abs(a - b) > POLICY.check_share * max(abs(a), abs(b)) and (
+            NONE[c.name] != "N m" or abs(a - b) > POLICY.check_torque * torque
+        )
+        return matters and _surely(c, of_model)
+
+    # What the regression did not find it cannot say of the model's records either: it has no term for it there.
+    of_model = None if c.regression.value == 0.0 else c.of_model
+    return apart(c.diagnosis) and (of_model is None or apart(of_model))
 
 
 def _of_diagnosis(mechanics: Mapping[str, Estimate], effects: Effects) -> dict[str, Estimate]:
@@ -264,33 +279,33 @@ def _verdict(own: float | None, second: float | None) -> Text:
     return say(text, better, second, own)
 
 
-def _smaller(
-    found: InverseDynamics, comparisons: Sequence[Comparison], model: Model, records: Sequence[Record]
-) -> tuple[Text, ...]:
-    """Notes on differences that do not matter, but are sure, and more than what the regression says of a right model.
+def _of_own_records(found: InverseDynamics, model: Model, records: Sequence[Record]) -> dict[str, Estimate]:
+    """What the regression says of records that the model itself made; empty where there are none.
 
     Not where a torque turns with a logged angle: in records of the model it turns with that angle, and its motion has another.
     """
     turning = any(r.position is not None for r in records) and any(e.row.turns for e in model.effects)
     if effects_before_the_shaft(model) or turning:
-        return ()
-    asked = [c for c in comparisons if not c.differs and _deviations(c, 0.0) > POLICY.check_deviations]
-    made = _made(model, records) if asked else None
+        return {}
+    made = _made(model, records)
     if made is None:
-        return ()
+        return {}
     try:
-        own = _of_regression(inverse_dynamics(list(made), terms=found.terms, cutoff_hz=found.cutoff_hz, axis=found.axis))
+        return _of_regression(inverse_dynamics(list(made), terms=found.terms, cutoff_hz=found.cutoff_hz, axis=found.axis))
     except GaidentError:
-        return ()
-    told = [(c, own[c.name]) for c in asked if c.name in own]
-    sure = [(c, e) for c, e in told if _deviations(c, e.value - c.diagnosis.value) > POLICY.check_deviations]
-    return tuple(_smaller_sentence(c, e) for c, e in sure)
+        return {}
 
 
-def _deviations(c: Comparison, off: float) -> float:
-    """By how many of both deviations the two are apart, the regression less what it is off by."""
-    apart, deviation = abs(c.regression.value - off - c.diagnosis.value), math.hypot(c.diagnosis.std, c.regression.std)
-    return apart / deviation if deviation > 0.0 else 0.0
+def _smaller(comparisons: Sequence[Comparison]) -> tuple[Text, ...]:
+    """Notes on differences that do not matter, but are sure, and more than what the regression says of the model itself."""
+    told = [(c, c.of_model) for c in comparisons if c.of_model is not None and not c.differs and _surely(c, c.diagnosis)]
+    return tuple(_smaller_sentence(c, e) for c, e in told if _surely(c, e))
+
+
+def _deviations(c: Comparison) -> float:
+    """By how many of both deviations the two are apart."""
+    deviation = math.hypot(c.diagnosis.std, c.regression.std)
+    return abs(c.regression.value - c.diagnosis.value) / deviation if deviation > 0.0 else 0.0
 
 
 def _smaller_sentence(c: Comparison, own: Estimate) -> Text:
@@ -300,7 +315,7 @@ def _smaller_sentence(c: Comparison, own: Estimate) -> Text:
         "records that the model itself made it says {:.3g} {}, so that its filter is not the reason."
     )
     share = 100.0 * abs(c.diagnosis.value - c.regression.value) / max(abs(c.diagnosis.value), abs(c.regression.value))
-    return say(text, mine.begun(), other, share, _deviations(c, 0.0), own.value, unit_text(own.unit))
+    return say(text, mine.begun(), other, share, _deviations(c), own.value, unit_text(own.unit))
 
 
 def _both(c: Comparison) -> tuple[Text, Text]:

@@ -60,14 +60,18 @@ class Comparison:
     """One quantity by two methods.
 
     name: "inertia", "dry friction", "gravity" or "ground stiffness"; differs: they contradict each other, and it matters.
+    of_model: what the regression says of the records that the diagnosed model itself made; None where that was not asked.
     """
 
     name: str
     diagnosis: Estimate
     regression: Estimate
     differs: bool
+    of_model: Estimate | None = None
 
     @classmethod
     def from_dict(cls, data: Mapping[str, Any]) -> Comparison:
         """The inverse of `dataclasses.asdict`."""
-        return cls(data["name"], Estimate(**data["diagnosis"]), Estimate(**data["regression"]), data["differs"])
+        of_model = data.get("of_model")
+        both = Estimate(**data["diagnosis"]), Estimate(**data["regression"])
+        return cls(data["name"], *both, data["differs"], None if of_model is None else Estimate(**of_model))

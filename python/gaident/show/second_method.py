@@ -5,6 +5,7 @@ from __future__ import annotations
 from gaident.axis import Text, identifier_words, said, say, unit
 from gaident.policy.table import POLICY
 from gaident.results.diagnosis import Diagnosis
+from gaident.results.fitness import Comparison
 from gaident.show.wording import number, with_std
 
 __all__ = ["comparison_rows", "force_rows", "force_words", "method_words"]
@@ -52,10 +53,18 @@ def comparison_rows(dia: Diagnosis, axis: str) -> list[tuple[str, str, str, str,
     """(what, by the diagnosis, by the regression, unit, remark)."""
     rows = []
     for c in dia.comparisons:
-        remark = "they disagree" if c.differs else ""
+        remark = "they disagree" if c.differs else _remark(c)
         values = with_std(c.diagnosis.value, c.diagnosis.std), with_std(c.regression.value, c.regression.std)
         rows.append((identifier_words(c.name.replace(" ", "_"), axis), *values, unit(c.regression.unit, axis), remark))
     return rows
+
+
+def _remark(c: Comparison) -> str:
+    """What is said beside two values that are far apart, and yet no contradiction."""
+    a, b, own = c.diagnosis.value, c.regression.value, c.of_model
+    if own is None or not abs(a - b) > POLICY.check_share * max(abs(a), abs(b)):
+        return ""
+    return f"of this model it would say {own.value:.4g}"
 
 
 def method_words(dia: Diagnosis, axis: str) -> str:

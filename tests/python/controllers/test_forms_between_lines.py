@@ -15,6 +15,7 @@ from gaident.diagnosis.controller.form_findings import loop_of
 from gaident.diagnosis.controller.forms import form_shown
 from gaident.identification.replay.command_timing import timed
 from gaident.identification.replay.timed_record import TimedRecord
+from gaident.policy.table import POLICY
 from loop_cases import PERIOD as T
 from loop_cases import jump_levels as levels
 from loop_cases import jump_log as record
@@ -60,6 +61,15 @@ def test_the_form_is_found_with_the_times(name: str, every: int) -> None:
             assert got == pytest.approx(value, rel=0.02, abs=0.01 if value == 0.0 else None), (part, parameter, std)
     (known,) = timed([rec], found.controller)
     assert isinstance(known, TimedRecord)
+
+
+def test_a_record_longer_than_the_regression_reads() -> None:
+    """More samples of the controller than `searched_samples`: the jumps of the lines that it reads are looked for, no others."""
+    whole = np.concatenate([levels(8, 30 + k) for k in range(9)])
+    assert whole.size > POLICY.searched_samples
+    loop, expected = LOOPS["backward"]
+    found = shown(record(whole, 8, loop), 8)
+    assert found is not None and set(found.numbers) == set(expected)
 
 
 def test_eight_samples_to_a_line() -> None:

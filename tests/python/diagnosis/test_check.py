@@ -33,7 +33,7 @@ def record(**effects: dict[str, float]) -> ga.Record:
 
 
 def estimates(effects: dict[str, dict[str, float]]) -> dict[str, dict[str, ga.Estimate]]:
-    units = {"torque": "N m", "amplitude": "N m", "phase": "rad", "width": "N m", "limit": "N m"}
+    units = {"torque": "N m", "amplitude": "N m", "phase": "rad", "width": "N m", "limit": "N m", "static_torque": "N m", "stribeck_velocity": "rad/s"}
     return {e: {n: ga.Estimate(v, 0.01 * v, units[n]) for n, v in p.items()} for e, p in effects.items()}
 
 
@@ -159,6 +159,18 @@ def test_a_small_difference_is_said_where_the_regression_of_a_right_model_has_it
     assert said(note, "linear").startswith("The mass of the diagnosis is 0.000309 +- 6.2e-07 kg, ")
     behind = check_of(rec, inertia=3.09e-4, share=2e-3, coulomb_friction=FRICTION, torque_dead_band={"width": 1e-4})
     assert behind.notes == ()
+
+
+def test_friction_that_falls_with_the_speed_is_no_contradiction() -> None:
+    """The regression has one level for all speeds: of the right model it says the same as of the record."""
+    falling = {"torque": 0.04, "static_torque": 0.12, "stribeck_velocity": 12.0}
+    check = check_of(record(stribeck_friction=falling), stribeck_friction=falling)
+    c = rows(check)["dry friction"]
+    assert c.regression.value > 1.2 * c.diagnosis.value and c.of_model is not None
+    assert c.of_model.value == pytest.approx(c.regression.value, rel=0.03)
+    assert not c.differs and check.notes == ()
+    wrong = check_of(record(stribeck_friction=falling), coulomb_friction={"torque": 0.04})
+    assert rows(wrong)["dry friction"].differs
 
 
 def test_friction_of_two_levels_is_compared_by_its_mean() -> None:

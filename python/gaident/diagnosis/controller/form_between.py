@@ -33,14 +33,15 @@ ROUNDS = 5  # no decision: of a solver: how many steps, the fourth one has conve
 FOLLOWED = 2  # no decision: of a solver: so many of a grid's best starts are followed
 
 
-def jumps_of(records: Sequence[Record], every: int) -> Unsure | None:
+def jumps_of(records: Sequence[Record], every: int, lengths: Sequence[int]) -> Unsure | None:
     """What the lines of all records, one after the other, do not tell of their commands; None where that is no jump, or known.
 
+    lengths: lines of each that the regression has; a long record has more.
     None also for a log of means: its jumps are taken to fall on the lines.
     """
     if every == 1 or any(r.command is None or isinstance(r, TimedRecord) or r.torque_log == MEAN for r in records):
         return None
-    commands = [r.command for r in records if r.command is not None]
+    commands = [r.command[:n] for r, n in zip(records, lengths, strict=True) if r.command is not None]
     if not any(len(jumps_between(c)) for c in commands):
         return None
     parts = [unsure_between(c, every) for c in commands]

@@ -113,7 +113,7 @@ def _form_of(
     if law.every > 1:
         following = _following(candidates, given, floor)
         open_times = between and law.around is None and (following is None or not following.strictly)
-        unsure = jumps_of(records, law.every) if open_times else None
+        unsure = jumps_of(records, law.every, law.lengths) if open_times else None
         if unsure is not None:
             told = _told(records, given, compared(law, given, floor, unknown, unsure))
             if told is not None:
