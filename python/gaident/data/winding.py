@@ -124,13 +124,15 @@ class Winding:
         samples = self.inductance / (self.resistance * dt)  # of the time constant L/R
         return np.asarray(self.torque_constant * (steady + (current - steady) * samples * -np.expm1(-1.0 / samples)))
 
-    def mean_current(self, current: ArrayLike, dt: float) -> Vector:
+    def mean_current(self, current: ArrayLike, dt: float, velocity: ArrayLike | None = None) -> Vector:
         """Return the mean over each sample of a current that was sampled at its ends, under a voltage held in between.
 
-            (g - a)/(1 - a) i(n) + (1 - g)/(1 - a) i(n+1),   a = exp(-R dt/L),   g = (1 - a) L/(R dt)
+            (1 - h) i(n) + h i(n+1) + (h - 1/2) ke/R (w(n+1) - w(n))
+            h = 1/(1 - a) - x,   a = exp(-1/x),   x = L/(R dt)
 
-        The current goes from i(n) to i(n+1) with the time constant L/R, whatever voltage and back-EMF are.
-        Without an inductance it jumps to i(n+1) at once; with a large one this is the mean of both.
+        The current goes with the time constant L/R to where it would settle, which the back-EMF lowers while the velocity goes
+        straight from w(n) to w(n+1).
+        Without an inductance it jumps, and falls to i(n+1) then; with a large one this is the mean of both.
 
         Parameters
         ----------
@@ -138,6 +140,8 @@ class Winding:
             i [A].
         dt : float
             Sample time [s].
+        velocity : array_like, shape (n,), optional
+            w [rad/s]; None: one that changes little within a sample.
 
         Returns
         -------
@@ -147,16 +151,13 @@ class Winding:
         Raises
         ------
         RecordError
-            An array that a Record would refuse, or a sample time that is not above 0.
+            An array that a Record would refuse, unequal lengths, or a sample time that is not above 0.
         """
         i, dt = channel(current, "current"), sample_time(dt)
-        following = np.concatenate([i[1:], i[-1:]])
-        if self.inductance == 0.0:
-            return following
-        samples = self.inductance / (self.resistance * dt)
-        gone = -np.expm1(-1.0 / samples)  # 1 - a
-        share = (1.0 - gone * samples) / gone
-        return np.asarray(share * following + (1.0 - share) * i)
+        w = np.zeros(len(i)) if velocity is None else channel(velocity, "velocity")
+        if len(w) != len(i):
+            raise RecordError(f"current has {len(i)} samples, velocity {len(w)}: give them of the same samples")
+        return mean_of_ends(i, w, share_of_end(self.inductance / (self.resistance * dt)), self)
 
     def _currents(self, voltage: ArrayLike, velocity: ArrayLike, dt: float) -> tuple[Vector, Vector, float]:
         """(i(n), s(n) that it goes to, dt), checked."""
@@ -172,3 +173,14 @@ class Winding:
         first = np.zeros(1) if at_rest else (U[:1] - self.emf * w[:1]) / self.resistance
         more = filtered(np.array([1.0 - a]), np.array([1.0, -a]), (towards[:-1] - first)[None, :], [len(U) - 1])[0]
         return np.concatenate([first, first + more]), towards, dt
+
+
+def share_of_end(x: float) -> float:
+    """h = 1/(1 - exp(-1/x)) - x of a time constant of x samples [1]; 1 where the current follows at once."""
+    return float(-1.0 / np.expm1(-1.0 / x) - x) if x > 0.0 else 1.0
+
+
+def mean_of_ends(current: Vector, velocity: Vector, share: float, winding: Winding) -> Vector:
+    """The mean current over each sample [A] from those at its ends, as `Winding.mean_current`; share: h."""
+    i, w = (np.concatenate([x, x[-1:]]) for x in (current, velocity))
+    return np.asarray(i[:-1] + share * np.diff(i) + (share - 0.5) * winding.emf / winding.resistance * np.diff(w))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -56,12 +56,13 @@ def torque_of_winding(table: LogTable, wanted: Wanted, values: Mapping[str, Vect
         R, ke = (fit.parameters[name] for name in ("resistance", "back_emf_constant"))
         note = (
             f"The winding was estimated from voltage, current and velocity: R = {R.value:.4g} +- {R.std:.2g} Ohm, back-EMF "
-            f"constant {ke.value:.4g} +- {ke.std:.2g} V s/rad, taken as the torque constant."
+            f"constant {ke.value:.4g} +- {ke.std:.2g} V s/rad, taken as the torque constant; {_inductance(fit)}."
         )
         kt = found.torque_constant
         if not fit.held:  # each line is a sample of a current that goes on between the lines
             return WindingTorque(kt * current, kind, wanted.torque_log, note)
-        return WindingTorque(_since_the_line_before(kt * found.mean_current(current, dt), kt * current[0]), kind, MEAN, note)
+        mean = kt * fit.mean_current(current, values["velocity"], dt)
+        return WindingTorque(_since_the_line_before(mean, kt * current[0]), kind, MEAN, note)
     if current is not None:
         raise ReadError(
             f"{table.path}: a current makes a torque with {arg('torque_constant', '...')} [N m/A], or with the voltage, from "
@@ -79,6 +80,14 @@ def torque_of_winding(table: LogTable, wanted: Wanted, values: Mapping[str, Vect
     if known.inductance is not None:
         return WindingTorque(torque, kind, MEAN, "")
     return WindingTorque(torque, wanted.torque_is or COMMANDED, MEAN, LAGS)
+
+
+def _inductance(fit: Any) -> str:
+    """What the fit says of the inductance, in words."""
+    told = fit.parameters["inductance"]
+    if fit.winding.inductance > 0.0:
+        return f"L = {told.value:.4g} +- {told.std:.2g} H"
+    return "its inductance does not show at this sample time"
 
 
 def _since_the_line_before(following: Vector, first: float) -> Vector:
