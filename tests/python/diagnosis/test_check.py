@@ -33,7 +33,15 @@ def record(**effects: dict[str, float]) -> ga.Record:
 
 
 def estimates(effects: dict[str, dict[str, float]]) -> dict[str, dict[str, ga.Estimate]]:
-    units = {"torque": "N m", "amplitude": "N m", "phase": "rad", "width": "N m", "limit": "N m", "static_torque": "N m", "stribeck_velocity": "rad/s"}
+    units = {
+        "torque": "N m",
+        "amplitude": "N m",
+        "phase": "rad",
+        "width": "N m",
+        "limit": "N m",
+        "static_torque": "N m",
+        "stribeck_velocity": "rad/s",
+    }
     return {e: {n: ga.Estimate(v, 0.01 * v, units[n]) for n, v in p.items()} for e, p in effects.items()}
 
 
