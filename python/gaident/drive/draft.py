@@ -10,13 +10,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gaident.axis import Text, said, say, unit, word
-from gaident.data.formats.units import Constants, factor, needed_constant
+from gaident.data.formats.units import factor, needed_constant
 from gaident.data.guess import Guess, guess_channels, unit_from_position, unit_from_velocity
 from gaident.data.listing import Listing
 from gaident.data.timeaxis import SLOW_STEP, even_step, stamp_unit
 from gaident.data.torque_kind import kind_of_torque
 from gaident.drive.draft_lines import head_of, line_of, plain, quoted
-from gaident.drive.log_content import axes_of, gaps_of, with_content
+from gaident.drive.log_content import axes_of, factor_of, gaps_of, is_linear, with_content
 from gaident.errors import ReadError
 from gaident.policy.table import POLICY
 
@@ -90,7 +90,7 @@ class _Draft:
         self.prefix = f"axes.{name}." if name else ""  # of the sections of one axis of several
         self.fill: list[str] = []
         self.units = {channel: column.unit for channel, column in guess.channels.items()}
-        self.axis = "linear" if any(_is_linear(channel, unit) for channel, unit in self.units.items()) else "rotary"
+        self.axis = "linear" if any(is_linear(channel, unit) for channel, unit in self.units.items()) else "rotary"
         torque = guess.channels.get("torque")
         self.torque_is = None if torque is None else kind_of_torque((torque.name, *torque.names))
         self.gaps, usual = gaps_of(values.get(guess.time.name) if guess.time else None)
@@ -122,7 +122,7 @@ class _Draft:
         channels = self.guess.channels
         if self.dt is None or not {"velocity", "position"} <= channels.keys() or self.units["velocity"] is not None:
             return
-        size = _factor("position", self.units["position"])
+        size = factor_of("position", self.units["position"])
         position, velocity = (self.values.get(channels[channel].name) for channel in ("position", "velocity"))
         if size is None or position is None or velocity is None or len(position) != len(velocity):
             return
@@ -135,7 +135,7 @@ class _Draft:
         channels = self.guess.channels
         if not {"velocity", "command"} <= channels.keys() or self.units["command"] is not None:
             return
-        size = _factor("velocity", self.units["velocity"] or self.compared.get("velocity", (None, ""))[0])
+        size = factor_of("velocity", self.units["velocity"] or self.compared.get("velocity", (None, ""))[0])
         command, velocity = (self.values.get(channels[channel].name) for channel in ("command", "velocity"))
         if size is None or command is None or velocity is None or len(command) != len(velocity):
             return
@@ -255,6 +255,11 @@ class _Draft:
                 needed = bool(either) or (other not in self.guess.channels and not self._placed)
                 line = f'# {channel} = "..."'
                 lines.append(self._todo(line, channel, told) if needed else line_of(line, told))
+        if self.axis == "rotary" and needed_constant("torque", self.units.get("torque") or "") == "torque_constant":
+            supplies = [c.name for c in self.listing.columns if c.name in rest and factor_of("voltage", c.unit) is not None]
+            if supplies:
+                what = "of the motor, beside current = ... in place of the torque: winding and torque constant are estimated"
+                lines.append(line_of(f"# voltage = {quoted(supplies[0])}", what))
         for channel in ("position", "position_command"):
             if channel not in self.guess.channels and (either := self._either(channel)):
                 lines.append(line_of(f'# {channel} = "..."', either))
@@ -276,7 +281,7 @@ class _Draft:
         si = {channel: unit(rotary, self.axis) for channel, rotary in _SI.items()}
         for channel in self.guess.channels:
             stated = self.units[channel]
-            if stated is not None and _factor(channel, stated) is None:
+            if stated is not None and factor_of(channel, stated) is None:
                 text = f"the log says {quoted(stated)}, which is not known"
                 lines.append(self._todo(f'# {channel} = "{si[channel]}"', f"units.{channel}", text))
             elif stated is not None:
@@ -333,7 +338,9 @@ class _Draft:
                 if positioned
                 else []
             ),
-            line_of('# loop = "sampled"', f'a digital drive; or "continuous"; or "open": the {torque} drives the model'),
+            line_of('# loop = "sampled"', f'a digital drive; or "continuous"; or "open": the {torque} drives the model')
+            if driven
+            else line_of('loop = "open"', f"without a command the {torque} drives the model"),
             line_of('# anti_windup = "hold"', 'at a torque_limit; or "tracking" with tracking_time'),
             line_of('# drive = "sinamics"', "with p1460 and p1462 in place of kp and ki: gains as the drive shows them"),
         ]
@@ -362,7 +369,7 @@ class _Draft:
         for channel in channels:
             column = self.guess.channels.get(channel)
             unit = self.units.get(channel) or self.compared.get(channel, (None, ""))[0]
-            size = _factor(channel, unit)
+            size = factor_of(channel, unit)
             if column is None or size is None or (unit and needed_constant(channel, unit)):
                 continue
             if column.lowest is not None and column.highest is not None:
@@ -376,20 +383,3 @@ class _Draft:
         comment = "; ".join(comments)
         self.fill.append(f"{what}: {comment}")
         return line_of(line, f"FILL IN: {comment}")
-
-
-def _factor(channel: str, unit: str | None) -> float | None:
-    """Factor to SI, constants of the drive taken as 1; None where the unit is not known."""
-    if unit is None:
-        return None
-    try:
-        return factor(channel, unit, Constants(1.0, 1.0, 1.0, 1.0, reference_speed=1.0))
-    except ReadError:
-        return None
-
-
-def _is_linear(channel: str, unit: str | None) -> bool:
-    if unit is None or _factor(channel, unit) is None:
-        return False
-    plain = unit.casefold().replace(" ", "")
-    return plain.startswith(("m/", "mm", "um", "met")) or plain in ("m", "n", "kn", "mn", "newton")

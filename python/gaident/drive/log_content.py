@@ -1,4 +1,4 @@
-"""What a log contains beyond the names of its columns: axes, gaps in its time, motion by its values."""
+"""What a log contains beyond the names of its columns: axes, gaps in its time, motion by its values, sizes of its units."""
 
 from __future__ import annotations
 
@@ -9,11 +9,13 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from gaident.data.formats.units import Constants, factor
 from gaident.data.guess import Guess, guess_channels, position_and_velocity
 from gaident.data.listing import Listing
+from gaident.errors import ReadError
 from gaident.policy.table import POLICY
 
-__all__ = ["axes_of", "gaps_of", "with_content"]
+__all__ = ["axes_of", "factor_of", "gaps_of", "is_linear", "with_content"]
 
 _OF_AN_AXIS = re.compile(r"([A-Za-z0-9_-]+)[.:/|\\]")
 """How the name of a column begins where the log contains several axes: X.n_act, axis1/torque."""
@@ -68,3 +70,21 @@ def with_content(listing: Listing, guess: Guess, values: Mapping[str, NDArray[np
     reasons = {"position": "the log's velocity is its derivative", "velocity": "the derivative of the log's position"}
     rest = {channel: c for channel, c in guess.channels.items() if c.name not in pair}
     return replace(guess, channels={**rest, **found}, reasons={**guess.reasons, **reasons})
+
+
+def factor_of(channel: str, unit: str | None) -> float | None:
+    """Factor to SI, constants of the drive taken as 1; None where the unit is not known."""
+    if unit is None:
+        return None
+    try:
+        return factor(channel, unit, Constants(1.0, 1.0, 1.0, 1.0, reference_speed=1.0))
+    except ReadError:
+        return None
+
+
+def is_linear(channel: str, unit: str | None) -> bool:
+    """Whether a channel in this unit is one of a linear axis."""
+    if unit is None or factor_of(channel, unit) is None:
+        return False
+    plain = unit.casefold().replace(" ", "")
+    return plain.startswith(("m/", "mm", "um", "met")) or plain in ("m", "n", "kn", "mn", "newton")

@@ -165,10 +165,10 @@ class DataSet:
         """Whether every record contains the controller's torque, and not one that the given controller was made to give."""
         return all(r.torque is not None for r in (self.read or self.records))
 
-    @cached_property
-    def substeps(self) -> int:
-        """Number of substeps of a sample, for every model with effects that are not smooth."""
-        return int(2 ** min(max(math.ceil(math.log2(self.dt / self.finest)), 0), MOST_SUBSTEPS))
+    def substeps(self, controller: Controller | None) -> int:
+        """Substeps for every model with effects that are not smooth: of a sample of the log, or of one of the controller's."""
+        sample = self.dt if controller is None else self.dt / controller.log_every(self.dt)
+        return int(2 ** min(max(math.ceil(math.log2(sample / self.finest)), 0), MOST_SUBSTEPS))
 
     @property
     def loop_only(self) -> bool:

@@ -144,7 +144,7 @@ class ClosedLoop:
         if not inside and not self.own_angle and _bends_the_angle(data, parameters):
             return np.vstack([_of_true_angle(data, parameters, x, data.turned, data.loop) for x in X])
         names, values = parameters.values(X)
-        steps = substeps(data, parameters.terms)
+        steps = substeps(data, parameters.terms, data.loop)
         records = data.records if self.own_angle else data.turned
         loaded = data.loaded(records, data.loop)
         starts = [parameters.standing(len(X), stored) for stored in data.stored]
@@ -204,11 +204,11 @@ class ObserverLoop:
         return ClosedLoop(self.data if inside else self.data.observed, self.own_angle)
 
 
-def substeps(data: DataSet, terms: Sequence[Term]) -> int | None:
+def substeps(data: DataSet, terms: Sequence[Term], controller: Controller | None) -> int | None:
     """As many for every model with effects, so that no candidate has an advantage by finer simulation."""
     # User-defined effects are smooth, and take long to evaluate.
     acting = any(not t.resonates and t.name not in OWN for t in terms)
-    return data.substeps if acting else None
+    return data.substeps(controller) if acting else None
 
 
 def _simulated(
@@ -220,7 +220,7 @@ def _simulated(
     records: Sequence[Record],
 ) -> Matrix:
     """Rows of x under the torques of the records, as the sensor shows the velocity."""
-    steps = data.steps_of(substeps(data, parameters.terms))
+    steps = data.steps_of(substeps(data, parameters.terms, None))
     parts = [
         r.velocities(parameters.structure, names, values, initial_states=parameters.start_values(X, i), substeps=steps)
         for i, r in enumerate(data.loaded(records, None))
@@ -254,7 +254,7 @@ def _of_true_angle(
     # Back through the sensor: what stands last in the chain is taken back first.
     bending = sorted((t for t in parameters.terms if t.seen_angle), key=lambda t: -place_of(t.name))
     bent = [(t.seen_angle, parameters.effect_values(x[None, :], t.name)[0]) for t in bending]
-    steps = substeps(data, parameters.terms)
+    steps = substeps(data, parameters.terms, controller)
     parts = []
     for i, (record, driven) in enumerate(zip(records, data.driven, strict=True)):
         angle = angle_of(driven)

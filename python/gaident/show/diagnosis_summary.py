@@ -198,7 +198,7 @@ def _gain(dia: Diagnosis, axis: str, scales: Scales) -> list[str]:
         lines += _wrapped(said(fall_words(dia), axis), "  ")
         steps = [f"{cause_words(f, dia, axis)} {step_words(f.gain)}" for f in dia.findings if not f.is_noise]
         if len(steps) > 1:
-            lines += _wrapped(f"One after the other, each of what was left before it: {', '.join(steps)}.", "  ")
+            lines += _wrapped(f"The error with one after the other, against that before it: {', '.join(steps)}.", "  ")
     return lines
 
 

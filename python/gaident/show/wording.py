@@ -70,13 +70,13 @@ def free_run_words(run: Fitness, written: Callable[[float], str] = number) -> tu
 
 
 def step_words(gain: float) -> str:
-    """By how much an effect lets the error of the free run fall, of what was left before it: "83 %"."""
+    """The error of the free run with an effect against that before it: "-83 %"."""
     if not gain > -1e6:  # no number where one run diverges after another  # no decision: printed: a number
-        return "nothing (the free run diverges)"
-    if gain < -1e3:  # no decision: printed: a number
-        return "nothing (the free run is worse by far)"
-    share = round(100.0 * gain)
-    return f"{share} %" if share >= 0 else f"nothing (the free run is worse: its error grows by {-share} %)"
+        return "the free run diverges"
+    if gain < -10.0:  # no decision: printed: a number
+        return "more than ten times larger"
+    share = round(-100.0 * gain)
+    return f"{share:+d} %" if share else "0 %"
 
 
 def with_std(value: float, std: float | None) -> str:

@@ -107,3 +107,20 @@ def test_the_gains_are_asked_for_in_a_position_loop_too(run: ga.Record) -> None:
     assert 'position_command = "pos_set [rad]"' in text
     assert re.search("^# kp = .*FILL IN", text, re.MULTILINE) and re.search("^# ki = .*FILL IN", text, re.MULTILINE)
     assert re.search('^# rule = "backward" ', text, re.MULTILINE) and re.search('^# anti_windup = "hold" ', text, re.MULTILINE)
+
+
+def test_without_a_command_the_torque_drives_the_model(run: ga.Record) -> None:
+    """The file is taken as it is; a voltage beside a current is offered for the winding."""
+    assert run.torque is not None
+    current, supply = run.torque / 0.06, 0.5 * run.torque / 0.06 + 0.06 * run.velocity
+    rows = np.column_stack([1e3 * run.time, supply, current, RPM * run.velocity, 57.3 * np.cumsum(1e-3 * run.velocity)])
+    written("motor.csv", ["t [ms]", "Spannung [V]", "Strom [A]", "Drehzahl [1/min]", "Lage [Grad]"], rows)
+    assert main(["init", "motor.csv"]) == 0
+    text = Path("drive.toml").read_text(encoding="utf-8")
+    assert re.search(r'^loop = "open" ', text, re.MULTILINE) and re.search(r'^position = "Grad" ', text, re.MULTILINE)
+    assert re.search(r'^# voltage = "Spannung \[V\]"', text, re.MULTILINE)
+    filled("drive.toml", torque_constant="0.06", torque_is='"measured"')
+    assert main(["identify", "motor.csv", "--drive", "drive.toml", "--quiet"]) == 0
+    offered = re.sub(r"^# voltage", "voltage", re.sub(r"^torque = ", "current = ", text, flags=re.MULTILINE), flags=re.MULTILINE)
+    Path("drive.toml").write_text(offered.replace('torque = "A"', 'current = "A"'), encoding="utf-8")
+    assert main(["identify", "motor.csv", "--drive", "drive.toml", "--quiet"]) == 0

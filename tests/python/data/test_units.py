@@ -35,6 +35,8 @@ KNOWN = [
     ("command", "RPM", 2 * PI / 60),
     ("position", "rad", 1.0),
     ("position", "deg", PI / 180),
+    ("position", "Grad", PI / 180),
+    ("velocity", "U/s", 2 * PI),
     ("position", "turn", 2 * PI),
     ("position", "counts", 2 * PI / 10_000),
     ("position", "m", 1.0),

@@ -50,8 +50,8 @@ _VELOCITY: dict[tuple[str, ...], _Unit] = {
     ("rpm", "1/min", "r/min", "rev/min", "u/min", "min-1", "min^-1", "min⁻¹", "turns/min", "tr/min", "giri/min", "upm"): _turning(
         _TURN / 60.0
     ),
-    ("rps", "rev/s", "turn/s", "turns/s"): _turning(_TURN),
-    ("deg/s", "°/s", "deg/sec", "degree/s", "degrees/s"): _turning(_TURN / 360.0),
+    ("rps", "rev/s", "turn/s", "turns/s", "u/s", "tr/s", "giri/s"): _turning(_TURN),
+    ("deg/s", "°/s", "deg/sec", "degree/s", "degrees/s", "grad/s"): _turning(_TURN / 360.0),
     ("counts/s", "count/s", "cnt/s", "inc/s", "pulses/s", "ticks/s"): _turning(_TURN, _COUNTS, divide=True),
     ("m/s", "m/sec", "m s-1"): _straight(1.0),
     ("mm/s", "mm/sec", "mm s-1"): _straight(1e-3),
@@ -64,8 +64,8 @@ _VELOCITY: dict[tuple[str, ...], _Unit] = {
 _POSITION: dict[tuple[str, ...], _Unit] = {
     ("rad", "radian", "radians"): _turning(1.0),
     ("mrad",): _turning(1e-3),
-    ("deg", "°", "degree", "degrees"): _turning(_TURN / 360.0),
-    ("turn", "turns", "rev", "revs"): _turning(_TURN),
+    ("deg", "°", "degree", "degrees", "grad"): _turning(_TURN / 360.0),
+    ("turn", "turns", "rev", "revs", "umdr", "umdrehungen", "giri"): _turning(_TURN),
     ("counts", "count", "cnt", "inc", "pulses", "ticks"): _turning(_TURN, _COUNTS, divide=True),
     ("m", "metre", "meter"): _straight(1.0),
     ("mm",): _straight(1e-3),

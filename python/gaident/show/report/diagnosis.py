@@ -182,7 +182,7 @@ def _causes(dia: Diagnosis, view: View) -> Section:
         rows: list[Row] = [(n, *map(typeset, cells), remark) for n, *cells, remark in map(_row(view), f.parameters.items())]
         kind = "in-sample" if dia.in_sample else "held-out"
         place = f"Place: {f.place}. " if f.place else ""
-        figures = f"{place}{f.delta_bic:.0f} BIC units; {kind}, it removes of the error left before it {step_words(f.gain)}."
+        figures = f"{place}{f.delta_bic:.0f} BIC units; {kind} error against that before it: {step_words(f.gain)}."
         parts.append(
             box(
                 tag("h3", name, " ", tag("small", "cannot be told apart" if f.alternatives else "named")),
