@@ -44,7 +44,7 @@ def test_identify_says_what_the_log_says_of_the_controller(here: Path, capsys: p
         assert main(["identify", "step.csv", *NAMES, *options, "--json"]) == 0
         return list(json.loads(capsys.readouterr().out)["warnings"])
 
-    biased = "The log has a command, but no gains were given"
+    biased = "The log has a command, but no controller is simulated"
     wrong = warnings("--kp", "0.05", "--ki", "1.367")[0]
     assert (
         wrong.startswith("The logged torque does not follow from command and velocity") and "Give kp = 0.0230" in wrong

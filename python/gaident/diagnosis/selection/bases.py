@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
@@ -198,10 +198,15 @@ class ByOutputErrors:
         """
         if self.axis is None:
             return None
+        fits = [self._fitted(self.axis, values, predictor) for values in _readings(self.axis, self.task.data)]
+        best = min(fits, key=lambda fit: fit.cost)
+        return best if best.cost < WORST else None
+
+    def _fitted(self, axis: InverseDynamics, values: Mapping[str, float], predictor: Predictor) -> Fit:
+        """The axis of these parameters of the regression, fitted by output errors."""
         task, data = self.task, self.task.data
-        values = {name: e.value for name, e in self.axis.parameters.items()}
         slowest = 1.0 / max(r.duration for r in data.records)
-        inertia, damping, stiffness = values["inertia"], max(_corner(self.axis), slowest), values.get("spring", 0.0)
+        inertia, damping, stiffness = values["inertia"], max(_corner(axis), slowest), values.get("spring", 0.0)
         rigid_axis = Model(1.0 / inertia, [-damping])
         if stiffness > 0.0:
             rigid_axis = Model(1.0 / inertia, quadratic_roots(damping, stiffness / inertia), [0.0])
@@ -213,8 +218,20 @@ class ByOutputErrors:
                 x = np.concatenate([x, np.clip(term.coordinates(own), low, high)])
                 parameters = parameters.extended(term)
         x = np.concatenate([x, np.zeros(sum(parameters.starts))])
-        fit = ls.fit(task.objective, Hypothesis(parameters, predictor), x, WHITE, POLICY.long)
-        return fit if fit.cost < WORST else None
+        return ls.fit(task.objective, Hypothesis(parameters, predictor), x, WHITE, POLICY.long)
+
+
+def _readings(axis: InverseDynamics, data: DataSet) -> list[dict[str, float]]:
+    """The parameters of the regression, and, where they cannot tell the two apart, with dry friction in the place of an offset.
+
+    Of an axis that hardly turns back an offset is a load or dry friction; what it did at rest tells, which a free run shows.
+    """
+    values = {name: e.value for name, e in axis.parameters.items()}
+    if "coulomb" not in axis.terms_not_tried or "offset" not in values:
+        return [values]
+    rest = {name: value for name, value in values.items() if name != "offset"}
+    forward = float(sum(r.velocity.sum() for r in data.records)) > 0.0  # no decision: a formula: the direction
+    return [values, {**rest, "coulomb": values["offset"] if forward else -values["offset"]}]
 
 
 def _by_output_errors(task: Task) -> ByOutputErrors:
