@@ -87,8 +87,8 @@ def open_loop_notes(records: Sequence[Record], controller: Controller | None) ->
         return []
     return [
         say(
-            "The log has a command, but no controller is simulated: its {torque} drives the model, and noise that goes through the "
-            "loop biases the result; give the gains of the controller."
+            "The log has a command, but no controller is simulated: its {torque} drives the model, and noise that goes through "
+            "the loop biases the result; give the gains of the controller."
         )
     ]
 
