@@ -113,7 +113,9 @@ def linear_bases(task: Task) -> tuple[Task, list[Fit]]:
     shaft = ShaftNoise(best.parameters.linear(best.x), task.scales.dt, task.data.pi)
     task = task.under(Innovations(shaft, family.floor))
     one, two = (ls.reestimated(task.objective, f) for f in (one, two))
-    if one.bic < two.bic or not swings(two) or task.scales.blocks > 1:
+    if not swings(two):
+        return task, [one]
+    if one.bic < two.bic or task.scales.blocks > 1:
         return task, [one, two]
     space = task.space()
     test = ScoreTest(task.objective)
@@ -142,7 +144,7 @@ def output_error_bases(task: Task, bases: Sequence[Fit]) -> list[Fit]:
         parameters = Parameterisation.of(model, task.scales, task.data.moving)
         starts.append((parameters, parameters.start(model)))
     fits = [ls.fit(task.objective, Hypothesis(p, predictor), x, WHITE, POLICY.usual) for p, x in starts]
-    fits.sort(key=lambda f: (not swings(f), f.cost))
+    fits = sorted(filter(swings, fits), key=lambda f: f.cost)
     return [next(f for f in fits if f.parameters.masses == m) for m in sorted({f.parameters.masses for f in fits})]
 
 

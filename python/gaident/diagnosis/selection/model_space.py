@@ -114,7 +114,9 @@ class ModelSpace(NoiseLevel):
         return swings(fit) and (fit.parameters.masses == 1 or self.rigid_below <= resonance(fit) < seen)
 
     def score(self, fit: Fit) -> float:
-        """BIC and the penalties of the effects; the lower the better."""
+        """BIC and the penalties of the effects; the lower the better. Infinite of two masses that do not swing: no shaft."""
+        if not swings(fit):
+            return float(np.inf)
         # The penalty is for candidates tried: what records show without a model, or a spring's tension at first, costs one less.
         made, spring = fit.parameters, fit.parameters.on_a_spring
         effects = sum(_depth(t) - (t.family in self.shown or (spring and LIBRARY[t.name].constant)) for t in made.terms)

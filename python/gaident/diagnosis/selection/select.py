@@ -145,8 +145,9 @@ def _decided(task: Task, note: Callable[[str], None]) -> _Found:
     again: Fit | None = None
     if min(space.ratio(b) for b in bases) > POLICY.noise_ratio:
         by_output = _by_output_errors(task.by_output_errors, bases, note)
-        again = _as_innovations(space, by_output.final)
-        test = specification(space, task, again)
+        innovations = _as_innovations(space, by_output.final)
+        again = innovations if swings(innovations) else None
+        test = specification(space, task, innovations)
         if test.contradicts and by_output.final.effects:
             return replace(by_output, specification=test)
     if again is not None and again.effects and space.is_noise(again) and space.small_unwhitened(again):
