@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 from gaident.arguments import arg
 from gaident.control.pi import PI
 from gaident.data.record import Record
-from gaident.errors import SpaceError
+from gaident.errors import RecordError, SpaceError
+from gaident.estimation.regression.inverse_dynamics import inverse_dynamics
 from gaident.models.drive_torque import torque_blocks
 from gaident.models.search_space import SearchSpace
 from gaident.policy.table import POLICY
@@ -100,12 +101,19 @@ def _gain_with_angle(records: Sequence[Record], controller: PI | None) -> list[f
 
     Below its resonance such an axis is further out where the torque is larger, and its velocity falls when the torque rises.
     A pendulum that swings far is on no spring: its gravity turns with the angle.
+    Dry friction at every reversal is in neither sum; where they fail, the inverse-dynamics regression has it, too.
     """
     of_spring = _regressed_with(records, controller, lambda angle: [angle])
     if of_spring[0] > 0.0 and of_spring[2] > 0.0:  # no decision: a formula: the places of K and c
         return [float(of_spring[0])]
     of_gravity = _regressed_with(records, controller, lambda angle: [np.sin(angle), np.cos(angle)])
-    return [float(of_gravity[0])] if of_gravity[0] > 0.0 else []
+    if of_gravity[0] > 0.0:
+        return [float(of_gravity[0])]
+    try:
+        inertia = inverse_dynamics(list(records)).parameters["inertia"]
+    except RecordError:
+        return []
+    return [1.0 / inertia.value] if inertia.value > POLICY.heavier * inertia.std else []
 
 
 def _regressed_with(

@@ -141,6 +141,23 @@ def test_a_pendulum_in_open_loop_has_no_wrong_sign(seed: int) -> None:
         assert found["coulomb_friction"]["torque"].value == pytest.approx(0.05, rel=0.03)
 
 
+def test_a_hanging_mass_moved_slowly_against_friction_has_no_wrong_sign() -> None:
+    """0.19 turns: the sums of momentum lack what dry friction does at the reversals; the regression of the same record has it."""
+    rng, t = np.random.default_rng(5), 1e-3 * np.arange(6000)
+    orders = np.array([1.0, 1.7, 2.9, 4.3])[:, None]
+    omega = 2.0 * np.pi * 0.3 * orders
+    phase = omega * t + rng.uniform(0.0, 6.28, 4)[:, None]
+    size = 2.0 * np.pi * 0.19 / np.ptp((np.sin(phase) / orders).sum(axis=0))
+    angle, w, a = (
+        size * (wave / orders).sum(axis=0) for wave in (np.sin(phase), omega * np.cos(phase), -(omega**2) * np.sin(phase))
+    )
+    angle -= angle[0]
+    torque = 1e-3 * a + 2e-3 * w + 0.02 * np.sign(w) + 0.3 * np.sin(angle + 0.3)
+    velocity = w + 0.005 * rng.standard_normal(len(t))
+    space = derive_space([ga.Record(1e-3, velocity=velocity, torque=torque, position=angle, torque_is="measured")], None)
+    assert space.gain[0] < 1000.0 < space.gain[1]
+
+
 def test_even_damping_leaves_a_drive_of_even_bearings_alone_and_mends_one_that_is_driven() -> None:
     """D_M/J_M = D_L/J_L = a: f1 = a + (e1 - a) f0/e0 is what the shaft's damping makes of the zeros."""
     model = ga.TwoMass(JM=2e-4, DM=1e-3, JL=3e-4, DL=1.5e-3, KG=60.0, DG=2e-3).model()
