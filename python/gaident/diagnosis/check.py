@@ -104,12 +104,13 @@ def checked(data: DataSet, gains: Gains, model: Model, mechanics: Mapping[str, E
     own = _of_own_records(found, model, records) if asked else {}
     ahead, torque = bool(effects_before_the_shaft(model)), after.torque_rms or 0.0
     rows = [replace(c, of_model=own.get(c.name)) for c in rows]
-    comparisons = tuple(replace(c, differs=not ahead and _contradicts(c, torque)) for c in rows)
+    comparable = [c.of_model is not None or not ahead for c in rows]  # the regression knows no effect ahead of the shaft
+    comparisons = tuple(replace(c, differs=b and _contradicts(c, torque)) for b, c in zip(comparable, rows, strict=True))
     verdict = _verdict(after.force_error, second)
     notes = tuple(_sentence(c) for c in comparisons if c.differs)
     lost = _lost(after, second, better)
     notes = (*notes[:-1], joined("", (notes[-1], verdict))) if notes else lost
-    notes = (*notes, *_smaller(comparisons))
+    notes = notes if ahead else (*notes, *_smaller(comparisons))
     return Check(found, second, comparisons, before, after, notes, _reason(effects, driven), better, bool(lost))
 
 
@@ -285,7 +286,7 @@ def _of_own_records(found: InverseDynamics, model: Model, records: Sequence[Reco
     Not where a torque turns with a logged angle: in records of the model it turns with that angle, and its motion has another.
     """
     turning = any(r.position is not None for r in records) and any(e.row.turns for e in model.effects)
-    if effects_before_the_shaft(model) or turning:
+    if turning:
         return {}
     made = _made(model, records)
     if made is None:

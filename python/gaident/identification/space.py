@@ -11,8 +11,7 @@ from numpy.typing import NDArray
 from gaident.arguments import arg
 from gaident.control.pi import PI
 from gaident.data.record import Record
-from gaident.errors import RecordError, SpaceError
-from gaident.estimation.regression.inverse_dynamics import inverse_dynamics
+from gaident.errors import SpaceError
 from gaident.models.drive_torque import torque_blocks
 from gaident.models.search_space import SearchSpace
 from gaident.policy.table import POLICY
@@ -98,35 +97,37 @@ def _gain_with_angle(records: Sequence[Record], controller: PI | None) -> list[f
 
         w = K int u dt - a int w dt - c int theta dt + b_0 + b_1 t,                        K > 0 and c > 0
         w = K int u dt - a int w dt - c int sin(theta) dt - d int cos(theta) dt + b_0 + b_1 t,   K > 0
+        the last one with - e int sign(w) dt,                                                     K > 0 and e > 0
 
     Below its resonance such an axis is further out where the torque is larger, and its velocity falls when the torque rises.
     A pendulum that swings far is on no spring: its gravity turns with the angle.
-    Dry friction at every reversal is in neither sum; where they fail, the inverse-dynamics regression has it, too.
+    Of one that is moved slowly dry friction takes more of the torque than inertia does.
     """
-    of_spring = _regressed_with(records, controller, lambda angle: [angle])
+    of_spring = _regressed_with(records, controller, lambda angle, _: [angle])
     if of_spring[0] > 0.0 and of_spring[2] > 0.0:  # no decision: a formula: the places of K and c
         return [float(of_spring[0])]
-    of_gravity = _regressed_with(records, controller, lambda angle: [np.sin(angle), np.cos(angle)])
+    of_gravity = _regressed_with(records, controller, lambda angle, _: [np.sin(angle), np.cos(angle)])
     if of_gravity[0] > 0.0:
         return [float(of_gravity[0])]
-    try:
-        inertia = inverse_dynamics(list(records)).parameters["inertia"]
-    except RecordError:
-        return []
-    return [1.0 / inertia.value] if inertia.value > POLICY.heavier * inertia.std else []
+    with_friction = _regressed_with(records, controller, lambda angle, w: [np.sin(angle), np.cos(angle), np.sign(w)])
+    return (
+        [float(with_friction[0])] if with_friction[0] > 0.0 and with_friction[4] > 0.0 else []
+    )  # no decision: a formula: K and e
 
 
 def _regressed_with(
-    records: Sequence[Record], controller: PI | None, columns: Callable[[Vector], Sequence[Vector]]
+    records: Sequence[Record], controller: PI | None, columns: Callable[[Vector, Vector], Sequence[Vector]]
 ) -> NDArray[np.float64]:
-    """(K, a, then the factors of what the torque depends on by the angle) of all records, each with b_0 and b_1 of its own."""
+    """(K, a, then the factors of what the torque depends on) of all records, each with b_0 and b_1 of its own."""
     gram: NDArray[np.float64] | float = 0.0
     right: NDArray[np.float64] | float = 0.0
     for rec in records:
         u = np.concatenate([part for _, part, _ in torque_blocks(rec, controller)])
         angle = np.cumsum(rec.velocity) * rec.dt if rec.position is None else rec.position
         moved = angle - angle[0]
-        x = np.vstack([np.cumsum(u) * rec.dt, -moved, *(-np.cumsum(c) * rec.dt for c in columns(angle)), rec.velocity])
+        x = np.vstack(
+            [np.cumsum(u) * rec.dt, -moved, *(-np.cumsum(c) * rec.dt for c in columns(angle, rec.velocity)), rec.velocity]
+        )
         line = np.vstack([np.ones(len(u)), np.linspace(-1.0, 1.0, len(u))])
         line[0] /= math.sqrt(_dot(line[0], line[0]))
         line[1] /= math.sqrt(_dot(line[1], line[1]))

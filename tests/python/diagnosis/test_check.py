@@ -131,6 +131,9 @@ def test_behind_an_actuator_the_logged_torque_is_not_comparable() -> None:
     check = check_of(record(torque_dead_band=width), torque_dead_band=width)
     assert check.notes == () and not any(c.differs for c in check.comparisons)
     assert check.after.force_error < 0.2 * check.before.force_error
+    wrong = check_of(record(torque_dead_band=width), inertia=9e-4, torque_dead_band=width)
+    c = rows(wrong)["inertia"]
+    assert c.differs and c.of_model is not None and c.of_model.value > 2.0 * c.regression.value
 
 
 def test_a_model_that_loses_to_the_regression_is_told_so_whatever_its_deviations() -> None:

@@ -28,6 +28,7 @@ __all__ = [
     "as_two_masses",
     "balanced",
     "balanced_on_a_spring",
+    "driven",
     "drives_itself",
     "evenly_damped",
     "is_mechanism",
@@ -290,20 +291,24 @@ def swings(fit: Fit) -> bool:
 
 
 def swings_at(parameters: Parameterisation, x: Vector) -> bool:
-    """Whether two masses are damped as those on a shaft; True for one.
-
-        e1 < 2 zeta sqrt(e0),   f1 < 2 zeta sqrt(f0),   f1 - e1 - a < 2 zeta0 sqrt(f0)
-
-    zeta is `swing_damping`, zeta0 `driven_damping`: (D_M + D_G)/J_M = a + e1 - f1 is positive where nothing drives the motor.
-    """
+    """Whether two masses are damped as those on a shaft: e1 < 2 zeta sqrt(e0), f1 < 2 zeta sqrt(f0); True for one."""
     if parameters.masses == 1:
         return True
-    _, a, e1, e0, f1, f0 = parameters.base_values(x[None, :])[0]
-    if not (e0 > 0.0 and f0 > 0.0):  # no decision: a formula: roots that swing at all
+    _, _, e1, e0, f1, f0 = parameters.base_values(x[None, :])[0]
+    twice = 2.0 * POLICY.swing_damping  # no decision: a formula: 2 zeta w
+    return bool(e0 > 0.0 and f0 > 0.0 and abs(e1) < twice * np.sqrt(e0) and abs(f1) < twice * np.sqrt(f0))
+
+
+def driven(fit: Fit) -> bool:
+    """Whether the shaft of two masses is driven at the motor's end: f1 - e1 - a > 2 zeta0 sqrt(f0); False for one.
+
+    (D_M + D_G)/J_M = a + e1 - f1 is positive on every shaft; zeta0 is `driven_damping`.
+    A linear fit of a shaft with a gap may come out so, but no model that explains a record.
+    """
+    if fit.parameters.masses == 1:
         return False
-    of_pole, of_zero = 2.0 * np.sqrt(e0), 2.0 * np.sqrt(f0)  # no decision: a formula: 2 zeta w
-    damped = abs(e1) < POLICY.swing_damping * of_pole and abs(f1) < POLICY.swing_damping * of_zero
-    return bool(damped and f1 - e1 - a < POLICY.driven_damping * of_zero)
+    _, a, e1, _, f1, f0 = fit.parameters.base_values(fit.x[None, :])[0]
+    return bool(f1 - e1 - a > 2.0 * POLICY.driven_damping * np.sqrt(max(f0, 0.0)))  # no decision: a formula: 2 zeta w
 
 
 def resonance(fit: Fit) -> float:

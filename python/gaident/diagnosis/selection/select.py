@@ -146,7 +146,7 @@ def _decided(task: Task, note: Callable[[str], None]) -> _Found:
     if min(space.ratio(b) for b in bases) > POLICY.noise_ratio:
         by_output = _by_output_errors(task.by_output_errors, bases, note)
         innovations = _as_innovations(space, by_output.final)
-        again = innovations if swings(innovations) else None
+        again = innovations if np.isfinite(space.score(innovations)) else None
         test = specification(space, task, innovations)
         if test.contradicts and by_output.final.effects:
             return replace(by_output, specification=test)

@@ -177,7 +177,7 @@ def _estimated(U: Vector, i: Vector, w: Vector, rec: Record, cutoff_hz: float | 
         raise RecordError(f"cutoff_hz={cutoff_hz!r}: give a corner between 0 and {0.5 / rec.dt:g} Hz, or None")
     factor = decimation_of(None, cutoff, rec.dt)
     repeated = float(np.mean(np.diff(U) == 0.0)) > 0.5  # no decision: a formula: most of them
-    rows = _Rows.of(*(low_passed(x, rec.dt, cutoff, ORDER) for x in (U, i, w)), factor)
+    rows = _Rows.of([low_passed(x, rec.dt, cutoff, ORDER) for x in (U, i, w)], factor)
     held, straight = _held(rows, rec.dt), _straight(rows, rec.dt)
     of, still = (held, True) if repeated or held.error <= straight.error else (straight, False)
     if not repeated and max(held.error, straight.error) < (1.0 + POLICY.voltage_alike) * of.error:
@@ -225,9 +225,9 @@ class _Rows(NamedTuple):
     w1: Vector
 
     @classmethod
-    def of(cls, U: Vector, i: Vector, w: Vector, factor: int) -> _Rows:
-        """Every so-many-th, without the ends, where the filter has no past."""
-        return cls(*(decimated(np.ascontiguousarray(x), factor)[2:-2] for s in (U, i, w) for x in (s[:-1], s[1:])))
+    def of(cls, signals: Sequence[Vector], factor: int) -> _Rows:
+        """Every so-many-th of U, i and w, without the ends, where the filter has no past."""
+        return cls(*(decimated(np.ascontiguousarray(x), factor)[2:-2] for s in signals for x in (s[:-1], s[1:])))
 
     def regressed(self, columns: Sequence[Vector], of: Vector) -> _Regressed:
         """The columns' coefficients, and last that of a constant."""
@@ -263,7 +263,7 @@ def _sampled_behind_a_step(rows: _Rows) -> _Fitted | None:
         end = float(np.clip(0.5 + c / R, 0.0, 1.0)) if R > 0.0 else 0.5  # no decision: a formula, and the start of the passes
     cov = covariance([found.X], [found.left])
     unsure = float(np.sqrt(4.0 * cov[2, 2] - 4.0 * cov[0, 2] + cov[0, 0]))  # of 2c - R
-    if not R - 2.0 * c > POLICY.winding_sure * unsure:
+    if not R - 2.0 * c > POLICY.winding_sure * unsure:  # no decision: a formula: 2c - R
         return None
     std = np.sqrt(np.diag(cov))
     return _Fitted(np.array([R, found.theta[1], 0.0, found.theta[3]]), std * [1, 1, 0, 1], 0.0, found.error, end)
@@ -300,7 +300,8 @@ def _settling(rows: _Rows, dt: float) -> _Fitted:
     cov = spread(math.exp(brentq(lambda step: math.log(spread(math.exp(step))[2, 2]) / 2.0 - step, *map(math.log, STEPS))))
     std = np.sqrt(np.diag(cov))
     deviations = x / float(std[2]) if std[2] > 0.0 else np.inf * x  # of x
-    std[2] = dt * np.sqrt(max(x**2 * cov[0, 0] + 2.0 * x * R * cov[0, 2] + R**2 * cov[2, 2], 0.0))  # of L = R dt x
+    slopes = np.array([x, 0.0, R, 0.0])  # of L/dt = R x
+    std[2] = dt * np.sqrt(max(float(slopes @ cov @ slopes), 0.0))
     return _Fitted(np.array([R, ke, R * dt * x, offset]), std, deviations, found.error, share_of_end(x))
 
 
