@@ -99,7 +99,7 @@ def checked(data: DataSet, gains: Gains, model: Model, mechanics: Mapping[str, E
     before, after, second, better = _forces(records, gains, found)
     if found is None:
         return replace(nothing, before=before, after=after, reason=_reason(effects, driven))
-    rows = _compared(found, mechanics, effects)
+    rows = _compared(_said(found, records), mechanics, effects)
     asked = any(_surely(c, c.diagnosis) for c in rows)
     own = _of_own_records(found, model, records) if asked else {}
     ahead, torque = bool(effects_before_the_shaft(model)), after.torque_rms or 0.0
@@ -200,9 +200,9 @@ def _made(model: Model, records: Sequence[Record]) -> tuple[Record, ...] | None:
     return tuple(made)
 
 
-def _compared(found: InverseDynamics, mechanics: Mapping[str, Estimate], effects: Effects) -> list[Comparison]:
-    """What both have, not judged yet."""
-    own, other = _of_diagnosis(mechanics, effects), _of_regression(found)
+def _compared(other: Mapping[str, Estimate], mechanics: Mapping[str, Estimate], effects: Effects) -> list[Comparison]:
+    """What both have, not judged yet; other: what the regression says."""
+    own = _of_diagnosis(mechanics, effects)
     both = [(name, own[name], other[name]) for name in NONE if name in own and name in other]
     return [Comparison(name, a, b, False) for name, a, b in both if not a.value == b.value == 0.0]
 
@@ -241,6 +241,23 @@ def _of_diagnosis(mechanics: Mapping[str, Estimate], effects: Effects) -> dict[s
         elif _is_gravity(term):
             found["gravity"] = parameters["amplitude"]
     return found
+
+
+def _said(found: InverseDynamics, records: Sequence[Record]) -> dict[str, Estimate]:
+    """What the regression says of these records: by its terms, and of dry friction that is none of them beside these.
+
+    Its filter may leave so little of a friction that the term is not chosen: that is no friction of 0 without a deviation.
+    """
+    rows = _of_regression(found)
+    if "coulomb" in found.terms_not_tried or any("coulomb" in name for name in found.terms):
+        return rows
+    try:
+        more = inverse_dynamics(
+            list(records), terms=(*found.terms, "coulomb"), cutoff_hz=found.cutoff_hz, axis=found.axis
+        ).parameters["coulomb"]
+    except GaidentError:
+        return rows
+    return {**rows, "dry friction": replace(more, unit=NONE["dry friction"])}
 
 
 def _of_regression(found: InverseDynamics) -> dict[str, Estimate]:
@@ -292,7 +309,8 @@ def _of_own_records(found: InverseDynamics, model: Model, records: Sequence[Reco
     if made is None:
         return {}
     try:
-        return _of_regression(inverse_dynamics(list(made), terms=found.terms, cutoff_hz=found.cutoff_hz, axis=found.axis))
+        own = inverse_dynamics(list(made), terms=found.terms, cutoff_hz=found.cutoff_hz, axis=found.axis)
+        return _said(replace(own, terms_not_tried=found.terms_not_tried), made)
     except GaidentError:
         return {}
 

@@ -224,12 +224,18 @@ class ByOutputErrors:
 
 
 def _readings(axis: InverseDynamics, data: DataSet) -> list[dict[str, float]]:
-    """The parameters of the regression, and, where they cannot tell the two apart, with dry friction in the place of an offset.
+    """The parameters of the regression, and with dry friction where it has none.
 
     Of an axis that hardly turns back an offset is a load or dry friction; what it did at rest tells, which a free run shows.
+    Elsewhere dry friction starts from a little: behind the regression's filter a fast motion may not show it.
     """
     values = {name: e.value for name, e in axis.parameters.items()}
-    if "coulomb" not in axis.terms_not_tried or "offset" not in values:
+    if any(name.startswith("coulomb") for name in values):
+        return [values]
+    if "coulomb" not in axis.terms_not_tried:
+        little = POLICY.check_torque * float(np.std(np.concatenate([r.torque for r in data.records if r.torque is not None])))
+        return [values, {**values, "coulomb": little}]
+    if "offset" not in values:
         return [values]
     rest = {name: value for name, value in values.items() if name != "offset"}
     forward = float(sum(r.velocity.sum() for r in data.records)) > 0.0  # no decision: a formula: the direction

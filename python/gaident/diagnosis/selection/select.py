@@ -18,7 +18,6 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gaident.diagnosis.selection.bases import ByOutputErrors, Task, heaviest, linear_bases, noise_floor, output_error_bases
 from gaident.diagnosis.selection.beam import Beam
@@ -37,8 +36,6 @@ from gaident.models.model import Model
 from gaident.policy.table import POLICY
 
 __all__ = ["Selection", "compared", "instead", "selected", "specification"]
-
-Vector = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
@@ -376,11 +373,14 @@ def _compared(found: _Found, classes: Classes, note: Callable[[str], None]) -> S
     space, final = found.space, found.space.deepened(found.final)
     for swaps_left in range(POLICY.swaps, -1, -1):
         rivals, better = of_each_effect(space, final, swaps_left > 0, classes, note)
-        if better is not None and space.hidden(better, final):
-            rivals, better = of_each_effect(space, final, False, classes, note)
+        if better is not None:
+            other = reduced_by(space.canonical(better), _reductions(space), space.prefers, space.score)
+            lost = len(other.effects) < len(final.effects) and space.score(other) > space.score(final)  # it is a rival only
+            if lost or space.hidden(better, final):
+                rivals, better = of_each_effect(space, final, False, classes, note)
         if better is None:
             break
-        final = reduced_by(space.canonical(better), _reductions(space), space.prefers, space.score)
+        final = other
     base = found.base if found.base.parameters.kind == final.parameters.kind else space.bare(final)
     return Selection(space, base, final, rivals, found.specification, found.whitened, found.axis)
 
