@@ -12,7 +12,7 @@ from gaident.diagnosis.library.equivalences import equivalents
 from gaident.diagnosis.library.sides import name_of
 from gaident.diagnosis.library.terms import LIBRARY, of_inverse_dynamics
 from gaident.diagnosis.selection.attribution import friction_shown
-from gaident.diagnosis.selection.mechanisms import driven, is_mechanism, one_mass, reduced, resonant, rigid, swings
+from gaident.diagnosis.selection.mechanisms import is_mechanism, on_no_shaft, one_mass, reduced, resonant, rigid, swings
 from gaident.diagnosis.selection.model_space import Grown
 from gaident.diagnosis.selection.moves import Moves
 from gaident.diagnosis.selection.score_test import ScoreTest
@@ -115,7 +115,7 @@ def linear_bases(task: Task) -> tuple[Task, list[Fit]]:
     one, two = (ls.reestimated(task.objective, f) for f in (one, two))
     if not swings(two):
         return task, [one]
-    if one.bic < two.bic or driven(two) or task.scales.blocks > 1:
+    if one.bic < two.bic or on_no_shaft(two) or task.scales.blocks > 1:
         return task, [one, two]
     space = task.space()
     test = ScoreTest(task.objective)

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from gaident.diagnosis.library.equivalences import equivalents
 from gaident.diagnosis.library.sides import called_of
 from gaident.diagnosis.library.terms import LIBRARY
-from gaident.diagnosis.selection.mechanisms import as_two_masses, driven, resonance, swings
+from gaident.diagnosis.selection.mechanisms import as_two_masses, on_no_shaft, resonance, swings
 from gaident.diagnosis.selection.noise_level import NoiseLevel
 from gaident.estimation import least_squares as ls
 from gaident.estimation.criterion import cost_of, effective_samples, gained_by_chance
@@ -115,7 +115,7 @@ class ModelSpace(NoiseLevel):
 
     def score(self, fit: Fit) -> float:
         """BIC and the penalties of the effects; the lower the better. Infinite of two masses that are on no shaft."""
-        if not swings(fit) or driven(fit):
+        if on_no_shaft(fit):
             return float(np.inf)
         # The penalty is for candidates tried: what records show without a model, or a spring's tension at first, costs one less.
         made, spring = fit.parameters, fit.parameters.on_a_spring
