@@ -54,7 +54,7 @@ from gaident.diagnosis.records.sizes import scales_of
 from gaident.diagnosis.selection import attribution
 from gaident.diagnosis.selection.offset import Offset, offset_of
 from gaident.diagnosis.selection.rivals import Replacement
-from gaident.diagnosis.selection.select import Selection, compared, instead, selected
+from gaident.diagnosis.selection.select import Selection, by_whitened_errors, compared, selected
 from gaident.diagnosis.selection.sensor_age import searched
 from gaident.diagnosis.unlogged.other_gains import OTHER_GAINS, OtherGains, gain_doubt, under_given
 from gaident.diagnosis.unlogged.unlogged_form import UnloggedForm, in_series, leaves_noise, unlogged_form
@@ -225,7 +225,7 @@ class Work:
         self.under, self.estimate = self.found.estimated()
 
     def judged(self) -> Judged:
-        """The effects that stand, and their gains. Where none stands, those of what takes the place of the model are judged."""
+        """The effects that stand, and their gains. Where none stands, those of the search by whitened errors are judged."""
         while True:
             said = list(self.notes)
             gains = self._accepted_gains()
@@ -252,12 +252,12 @@ class Work:
                 driver = driver or self.left.strongest or "time"
                 self.notes += why
             self.notes += basis_of(self.found, driver is not None)
-            other = None if causes else instead(self.found, check.loses, self._equivalent_here, self._say)
-            if other is None:
+            instead = None if causes else by_whitened_errors(self.found, self._equivalent_here, self._say)
+            if instead is None:
                 self.notes += gains.notes
                 return Judged(gains, driver, causes, estimates, offset_of(self.found.space, self.final), mechanics, model, check)
             self.notes = said
-            self.take(other)
+            self.take(instead)
 
     def _made(self, x: NDArray[np.float64]) -> Model:
         return with_effects(self.estimate.parameters.model(x), self.at_controller.effects)

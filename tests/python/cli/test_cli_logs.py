@@ -64,7 +64,7 @@ def test_names_of_a_file_do_nothing_to_the_terminal(here: Path, capsys: pytest.C
     shown = capsys.readouterr().out
     assert "\x1b" not in shown and "speed \\x1b[31m" in shown
     sections = read_drive_file("drive.toml")
-    assert sections["columns"]["torque"] == 'torque "\n[controller]\nkp = 1' and sections["controller"] == {}
+    assert sections["columns"]["torque"] == 'torque "\n[controller]\nkp = 1' and sections["controller"] == {"loop": "open"}
     call = ["identify", "evil.npz", "--drive", "drive.toml", "--quiet"]
     assert main(call) == 2
     assert "line 19: velocity and torque of [units], marked FILL IN, are not filled in" in capsys.readouterr().err

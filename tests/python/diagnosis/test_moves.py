@@ -162,9 +162,6 @@ def _no_simulator(monkeypatch: pytest.MonkeyPatch) -> None:
     for module in (model_space, noise_level):
         monkeypatch.setattr(module, "OpenLoop", Toy)
     monkeypatch.setattr(moves, "OpenLoop", Toy)
-    monkeypatch.setattr(
-        model_space, "on_no_shaft", lambda fit: False
-    )  # base parameters of the toy are sizes of signals, of no shaft
 
 
 class Bench:

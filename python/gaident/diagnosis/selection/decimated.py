@@ -18,7 +18,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gaident.data.record import Record
-from gaident.diagnosis.selection.moves import Moves
 from gaident.estimation.dataset import FINEST, DataSet
 from gaident.estimation.noise_model import WHITE
 from gaident.estimation.objective import Fit, Hypothesis, Objective
@@ -29,7 +28,7 @@ from gaident.estimation.term import Scales
 from gaident.models.held_torque import held_torque, kind_of_held
 from gaident.policy.table import POLICY
 
-__all__ = ["blocks_of", "decimated", "decimated_record", "refitted_there"]
+__all__ = ["blocks_of", "decimated", "decimated_record", "moved"]
 
 Vector = NDArray[np.float64]
 
@@ -90,9 +89,3 @@ def moved(data: DataSet, scales: Scales, fit: Fit) -> Fit:
         x = np.concatenate([x, np.clip(t.coordinates(natural), low, high)])
     x = np.concatenate([x, np.zeros(sum(new.starts))])
     return Fit(Hypothesis(new, OpenLoop(data, fit.predictor.own_angle)), x, WHITE, WORST, np.inf)
-
-
-def refitted_there(space: Moves, scales: Scales, fit: Fit) -> Fit:
-    """The same model, fitted on the grid of time of the space."""
-    start = moved(space.data, scales, fit)
-    return space.refitted(start.hypothesis, start.x)

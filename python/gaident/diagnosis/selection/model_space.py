@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from gaident.diagnosis.library.equivalences import equivalents
 from gaident.diagnosis.library.sides import called_of
 from gaident.diagnosis.library.terms import LIBRARY
-from gaident.diagnosis.selection.mechanisms import as_two_masses, on_no_shaft, resonance, swings
+from gaident.diagnosis.selection.mechanisms import as_two_masses, resonance, swings
 from gaident.diagnosis.selection.noise_level import NoiseLevel
 from gaident.estimation import least_squares as ls
 from gaident.estimation.criterion import cost_of, effective_samples, gained_by_chance
@@ -114,9 +114,7 @@ class ModelSpace(NoiseLevel):
         return swings(fit) and (fit.parameters.masses == 1 or self.rigid_below <= resonance(fit) < seen)
 
     def score(self, fit: Fit) -> float:
-        """BIC and the penalties of the effects; the lower the better. Infinite of two masses that are on no shaft."""
-        if on_no_shaft(fit):
-            return float(np.inf)
+        """BIC and the penalties of the effects; the lower the better."""
         # The penalty is for candidates tried: what records show without a model, or a spring's tension at first, costs one less.
         made, spring = fit.parameters, fit.parameters.on_a_spring
         effects = sum(_depth(t) - (t.family in self.shown or (spring and LIBRARY[t.name].constant)) for t in made.terms)

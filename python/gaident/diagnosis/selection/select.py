@@ -18,11 +18,12 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from gaident.diagnosis.selection.bases import ByOutputErrors, Task, heaviest, linear_bases, noise_floor, output_error_bases
 from gaident.diagnosis.selection.beam import Beam
 from gaident.diagnosis.selection.beam import reduced as reduced_by
-from gaident.diagnosis.selection.decimated import blocks_of, decimated_objective, refitted_there
+from gaident.diagnosis.selection.decimated import blocks_of, decimated_objective, moved
 from gaident.diagnosis.selection.mechanisms import drives_itself, resonance, swings
 from gaident.diagnosis.selection.model_space import words
 from gaident.diagnosis.selection.moves import Moves
@@ -35,7 +36,9 @@ from gaident.estimation.term import Scales, Term
 from gaident.models.model import Model
 from gaident.policy.table import POLICY
 
-__all__ = ["Selection", "compared", "instead", "selected", "specification"]
+__all__ = ["Selection", "by_whitened_errors", "compared", "selected", "specification"]
+
+Vector = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,7 +48,6 @@ class Selection:
     space: of the noise family that decided; base: its linear part, fitted alone; final: the model; rivals: effect -> (gain in BIC
     units, explanations in its place); specification: the test of the model of whitened errors, None where it was not asked.
     whitened: what whitened errors had selected, where output errors decided and both searches ran.
-    axis: the regressed one, fitted by output errors, where these were searched and the records show one.
     """
 
     space: Moves
@@ -54,7 +56,6 @@ class Selection:
     rivals: dict[str, tuple[float, list[Replacement]]]
     specification: Specification | None
     whitened: _Found | None = None
-    axis: _Found | None = None
 
     def estimated(self) -> tuple[Objective, Fit]:
         """What the parameters of the selected model are estimated under, and the model with them.
@@ -120,7 +121,6 @@ class _Found:
     final: Fit
     specification: Specification | None = None
     whitened: _Found | None = None
-    axis: _Found | None = None
 
     def of(self, final: Fit) -> _Found:
         """The same with another model, and its linear part."""
@@ -142,9 +142,8 @@ def _decided(task: Task, note: Callable[[str], None]) -> _Found:
     again: Fit | None = None
     if min(space.ratio(b) for b in bases) > POLICY.noise_ratio:
         by_output = _by_output_errors(task.by_output_errors, bases, note)
-        innovations = _as_innovations(space, by_output.final)
-        again = innovations if np.isfinite(space.score(innovations)) else None
-        test = specification(space, task, innovations)
+        again = _as_innovations(space, by_output.final)
+        test = specification(space, task, again)
         if test.contradicts and by_output.final.effects:
             return replace(by_output, specification=test)
     if again is not None and again.effects and space.is_noise(again) and space.small_unwhitened(again):
@@ -162,9 +161,9 @@ def _decided(task: Task, note: Callable[[str], None]) -> _Found:
             base, final = space.bare(better), better
         test = specification(space, task, final)
         by_output = _offered(by_output, final)
+    whitened = _Found(space, base, final, test)
     if by_output is None:
-        return _Found(space, base, final, test)
-    whitened = _Found(space, base, final, test, axis=by_output.axis)
+        return whitened
     impossible = bool(by_output.final.effects) and drives_itself(final) and not space.small_unwhitened(final)
     if test.contradicts or impossible or not space.is_noise(final) or by_output.space.hidden(final, by_output.final):
         return replace(by_output, specification=test, whitened=whitened)
@@ -191,7 +190,6 @@ def _by_output_errors(output: ByOutputErrors, bases: Sequence[Fit], note: Callab
     task = _informed(output, least, axis)
     space = task.space()
     rigid = None if axis is None else task.objective.rescored(axis)
-    regressed = None if rigid is None else _Found(space, space.bare(rigid), rigid)
     if rigid is not None and rigid.effects and space.quiet(rigid) and space.small_unwhitened(rigid):
         final = _grown(space, rigid)
         return _Found(space, space.bare(final), final)
@@ -199,7 +197,7 @@ def _by_output_errors(output: ByOutputErrors, bases: Sequence[Fit], note: Callab
     base, final = _explored(task, space, bases)
     if rigid is not None:
         final = _improved(space, rigid, final)
-    return _by_noise(output, _Found(space, base, base, axis=regressed).of(final), bases)
+    return _by_noise(output, _Found(space, base, base).of(final), bases)
 
 
 def _by_noise(output: ByOutputErrors, found: _Found, bases: Sequence[Fit]) -> _Found:
@@ -219,7 +217,7 @@ def _by_noise(output: ByOutputErrors, found: _Found, bases: Sequence[Fit]) -> _F
     space = output.informed(effective_samples(space.objective.unwhitened_errors(least))).space()
     best, other = (space.objective.rescored(f) for f in (found.final, least))
     final = _improved(space, other, best)
-    return found if final is best else _Found(space, space.bare(final), final, axis=found.axis)
+    return found if final is best else _Found(space, space.bare(final), final)
 
 
 def _informed(output: ByOutputErrors, linear: Fit, axis: Fit | None) -> Task:
@@ -344,10 +342,10 @@ def _on_all_samples(task: Task, outline: _Found, note: Callable[[str], None]) ->
     )
     selecting = task
     if not outline.space.whitens:
-        linear = refitted_there(task.by_output_errors.task.space(), task.scales, outline.base)
+        linear = _moved(task.by_output_errors.task.space(), task.scales, outline.base)
         selecting = _informed(task.by_output_errors, linear, task.by_output_errors.regressed(linear.predictor))
     space = selecting.space()
-    base, final = (refitted_there(space, task.scales, f) for f in (outline.base, outline.final))
+    base, final = (_moved(space, task.scales, f) for f in (outline.base, outline.final))
     final = reduced_by(final, _reductions(space), space.prefers, space.score)
     note(f"looking beyond {words(final.effects) or 'the linear model'}, at all samples")
     # An effect faster than a step of the coarse grid shows there as a resonance: the search also starts without that resonance.
@@ -368,30 +366,28 @@ def _or(found: _Found, model: Fit | None) -> _Found:
     return found if better is found.final else found.of(better)
 
 
+def _moved(space: Moves, scales: Scales, fit: Fit) -> Fit:
+    start = moved(space.data, scales, fit)
+    return space.refitted(start.hypothesis, start.x)
+
+
 def _compared(found: _Found, classes: Classes, note: Callable[[str], None]) -> Selection:
     """The model of least cost near by, with the rivals of its effects; a better rival replaces it and is compared in turn."""
     space, final = found.space, found.space.deepened(found.final)
     for swaps_left in range(POLICY.swaps, -1, -1):
         rivals, better = of_each_effect(space, final, swaps_left > 0, classes, note)
-        if better is not None:
-            other = reduced_by(space.canonical(better), _reductions(space), space.prefers, space.score)
-            lost = len(other.effects) < len(final.effects) and space.score(other) > space.score(final)  # it is a rival only
-            if lost or space.hidden(better, final):
-                rivals, better = of_each_effect(space, final, False, classes, note)
+        if better is not None and space.hidden(better, final):
+            rivals, better = of_each_effect(space, final, False, classes, note)
         if better is None:
             break
-        final = other
+        final = reduced_by(space.canonical(better), _reductions(space), space.prefers, space.score)
     base = found.base if found.base.parameters.kind == final.parameters.kind else space.bare(final)
-    return Selection(space, base, final, rivals, found.specification, found.whitened, found.axis)
+    return Selection(space, base, final, rivals, found.specification, found.whitened)
 
 
-def instead(selection: Selection, loses: bool, classes: Classes, note: Callable[[str], None]) -> Selection | None:
-    """What takes the place of a model whose names do not stand, with its rivals; None where nothing does.
-
-    That is what whitened errors had selected, and then, where the model loses to the regression, the axis of that.
-    """
-    other = selection.whitened or (selection.axis if loses else None)
-    return None if other is None else _compared(other, classes, note)
+def by_whitened_errors(selection: Selection, classes: Classes, note: Callable[[str], None]) -> Selection | None:
+    """What whitened errors had selected, with its rivals; None where that model decided, or none was searched."""
+    return None if selection.whitened is None else _compared(selection.whitened, classes, note)
 
 
 def compared(selection: Selection, final: Fit, classes: Classes, note: Callable[[str], None]) -> Selection:
