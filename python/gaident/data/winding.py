@@ -183,4 +183,5 @@ def share_of_end(x: float) -> float:
 def mean_of_ends(current: Vector, velocity: Vector, share: float, winding: Winding) -> Vector:
     """The mean current over each sample [A] from those at its ends, as `Winding.mean_current`; share: h."""
     i, w = (np.concatenate([x, x[-1:]]) for x in (current, velocity))
-    return np.asarray(i[:-1] + share * np.diff(i) + (share - 0.5) * winding.emf / winding.resistance * np.diff(w))
+    braked = winding.emf / winding.resistance * np.diff(w)
+    return np.asarray((1.0 - share) * i[:-1] + share * i[1:] + (share - 0.5) * braked)

@@ -99,9 +99,9 @@ def checked(data: DataSet, gains: Gains, model: Model, mechanics: Mapping[str, E
     before, after, second, better = _forces(records, gains, found)
     if found is None:
         return replace(nothing, before=before, after=after, reason=_reason(effects, driven))
-    rows = _compared(_said(found, records), mechanics, effects)
+    rows = _compared(_said(found, records, _has_friction(effects)), mechanics, effects)
     asked = any(_surely(c, c.diagnosis) for c in rows)
-    own = _of_own_records(found, model, records) if asked else {}
+    own = _of_own_records(found, model, records, _has_friction(effects)) if asked else {}
     ahead, torque = bool(effects_before_the_shaft(model)), after.torque_rms or 0.0
     rows = [replace(c, of_model=own.get(c.name)) for c in rows]
     comparable = [c.of_model is not None or not ahead for c in rows]  # the regression knows no effect ahead of the shaft
@@ -243,13 +243,18 @@ def _of_diagnosis(mechanics: Mapping[str, Estimate], effects: Effects) -> dict[s
     return found
 
 
-def _said(found: InverseDynamics, records: Sequence[Record]) -> dict[str, Estimate]:
-    """What the regression says of these records: by its terms, and of dry friction that is none of them beside these.
+def _has_friction(effects: Effects) -> bool:
+    """Whether a diagnosis names dry friction."""
+    return any(LIBRARY[effect].levels for effect in effects)
+
+
+def _said(found: InverseDynamics, records: Sequence[Record], friction: bool) -> dict[str, Estimate]:
+    """What the regression says of these records: by its terms, and of dry friction that is asked for and is none of them.
 
     Its filter may leave so little of a friction that the term is not chosen: that is no friction of 0 without a deviation.
     """
     rows = _of_regression(found)
-    if "coulomb" in found.terms_not_tried or any("coulomb" in name for name in found.terms):
+    if not friction or "coulomb" in found.terms_not_tried or any("coulomb" in name for name in found.terms):
         return rows
     try:
         more = inverse_dynamics(
@@ -297,7 +302,7 @@ def _verdict(own: float | None, second: float | None) -> Text:
     return say(text, better, second, own)
 
 
-def _of_own_records(found: InverseDynamics, model: Model, records: Sequence[Record]) -> dict[str, Estimate]:
+def _of_own_records(found: InverseDynamics, model: Model, records: Sequence[Record], friction: bool) -> dict[str, Estimate]:
     """What the regression says of records that the model itself made; empty where there are none.
 
     Not where a torque turns with a logged angle: in records of the model it turns with that angle, and its motion has another.
@@ -310,7 +315,7 @@ def _of_own_records(found: InverseDynamics, model: Model, records: Sequence[Reco
         return {}
     try:
         own = inverse_dynamics(list(made), terms=found.terms, cutoff_hz=found.cutoff_hz, axis=found.axis)
-        return _said(replace(own, terms_not_tried=found.terms_not_tried), made)
+        return _said(replace(own, terms_not_tried=found.terms_not_tried), made, friction)
     except GaidentError:
         return {}
 

@@ -110,9 +110,8 @@ def _gain_with_angle(records: Sequence[Record], controller: PI | None) -> list[f
     if of_gravity[0] > 0.0:
         return [float(of_gravity[0])]
     with_friction = _regressed_with(records, controller, lambda angle, w: [np.sin(angle), np.cos(angle), np.sign(w)])
-    return (
-        [float(with_friction[0])] if with_friction[0] > 0.0 and with_friction[4] > 0.0 else []
-    )  # no decision: a formula: K and e
+    found = with_friction[0] > 0.0 and with_friction[4] > 0.0  # no decision: a formula: the places of K and e
+    return [float(with_friction[0])] if found else []
 
 
 def _regressed_with(

@@ -14,13 +14,7 @@ from drive_cases import random_case
 from drive_rig import Plant, run_drive, skip_without_library
 from fine_integrator import FineCase, integrate
 from gaident.diagnosis.mechanics import MECHANICS, moved
-from gaident.diagnosis.selection.mechanisms import (
-    balanced_on_a_spring,
-    evenly_damped,
-    is_mechanism,
-    reduced,
-    rigid,
-)
+from gaident.diagnosis.selection.mechanisms import balanced_on_a_spring, evenly_damped, is_mechanism, reduced, rigid
 from gaident.estimation.dataset import DataSet
 from gaident.estimation.noise_model import WHITE
 from gaident.estimation.objective import Fit, Hypothesis
@@ -148,7 +142,7 @@ def test_a_pendulum_in_open_loop_has_no_wrong_sign(seed: int) -> None:
 
 
 def test_a_hanging_mass_moved_slowly_against_friction_has_no_wrong_sign() -> None:
-    """0.19 turns: the sums of momentum lack what dry friction does at the reversals; the regression of the same record has it."""
+    """0.19 turns: the sums of momentum of gravity alone lack what dry friction does at the reversals."""
     rng, t = np.random.default_rng(5), 1e-3 * np.arange(6000)
     orders = np.array([1.0, 1.7, 2.9, 4.3])[:, None]
     omega = 2.0 * np.pi * 0.3 * orders
