@@ -101,3 +101,12 @@ def test_an_effect_inside_the_controller_is_simulated_in_the_drives_loop() -> No
     np.testing.assert_array_equal(ObserverLoop(found).velocities(p, x[None, :]), ClosedLoop(found).velocities(p, x[None, :]))
     assert ObserverLoop.possible(found) and not ObserverLoop.possible(found.aged(0.5))
     assert not ObserverLoop.possible(replace(found, controller=ga.Cascade(LOOP, period=DT / 2)))
+
+
+def test_substeps_are_those_of_the_samples_that_are_simulated() -> None:
+    """Of a line of 1 ms 8, of the controller's sample of 125 us in a loop 1: each of them 0.125 ms, whatever drives the model."""
+    t = 1e-3 * np.arange(400)
+    rec = ga.Record(1e-3, command=np.sin(50.0 * t), velocity=np.sin(50.0 * t), torque=np.cos(50.0 * t))
+    slow = ga.Cascade(ga.PI(0.1, 1.0), period=125e-6)
+    data = DataSet.of([rec], slow)
+    assert (data.substeps(None), data.substeps(slow), data.substeps(ga.PI(0.1, 1.0))) == (8, 1, 8)
