@@ -19,7 +19,7 @@ from scipy.stats import chi2
 import gaident as ga
 from gaident.control.controller import Limiting
 from gaident.diagnosis.library.cause import Cause
-from gaident.diagnosis.selection import mechanisms, model_space, moves, noise_level, rivals, score_test, side_moves
+from gaident.diagnosis.selection import mechanisms, model_space, moves, noise_level, rivals, score_test, select, side_moves
 from gaident.diagnosis.selection.bases import Task
 from gaident.diagnosis.selection.bootstrap import largest_gains
 from gaident.diagnosis.selection.rivals import Replacement, rivals_of
@@ -389,6 +389,39 @@ def test_of_effects_that_are_the_same_to_every_record_the_first_has_the_name(mon
     assert better(seen, lag, POLICY.swap + 0.1) is None
     assert better(lag, seen, -0.3) is None
     assert better(lag, seen, -POLICY.swap - 0.1) is seen
+
+
+def test_of_one_family_dry_friction_has_the_name_before_what_has_no_level(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A drag that grows with the root of the speed comes within the margin of dry friction; every axis has that."""
+    bench = Bench({"level": (0.5,)})
+    rooted = replace(A, family=LEVEL.family)
+    level, drag = bench.fit(LEVEL), bench.fit(rooted)
+
+    def better(final: Fit, other: Fit, behind: float) -> Fit | None:
+        one = Replacement(other.effects[0], behind, other)
+        monkeypatch.setattr(rivals, "rivals_of", lambda *arguments: (90.0, [one]))
+        return rivals.of_each_effect(bench.space, final, True, lambda effect: (), lambda message: None)[1]
+
+    assert better(drag, level, bench.space.margin - 0.1) is level
+    assert better(drag, level, bench.space.margin + 0.1) is None
+    assert better(level, drag, 0.3) is None
+    assert better(bench.fit(A), level, 0.3) is None, "another family"
+
+
+def test_a_rival_that_loses_its_effect_and_is_worse_takes_no_place(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Reduced, it is a model without the effect: it stays an alternative, and the model keeps its name."""
+    bench = Bench({"a": (0.5,)})
+    final, rival = bench.fit(A), bench.fit(B)
+    found = select._Found(bench.space, bench.fit(), final)
+    monkeypatch.setattr(
+        select, "of_each_effect", lambda space, fit, may_swap, *more: ({"a": (90.0, [])}, rival if may_swap else None)
+    )
+    kept = select._compared(found, lambda effect: (), lambda message: None)
+    assert kept.final is final
+    better = bench.fit(A, C)
+    monkeypatch.setattr(select, "of_each_effect", lambda space, fit, *more: ({}, better if fit is final else None))
+    monkeypatch.setattr(select, "reduced_by", lambda fit, *more: fit)
+    assert select._compared(found, lambda effect: (), lambda message: None).final.effects == better.effects
 
 
 def test_beside_coloured_noise_only_what_promises_something_is_fitted_to_the_end(monkeypatch: pytest.MonkeyPatch) -> None:

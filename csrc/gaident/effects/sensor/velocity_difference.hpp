@@ -55,6 +55,8 @@ struct VelocityDifference {
         s.sum = fma(c.step, (s.w + w_next) * R(0.5), s.sum);
         s.w = w_next;
         if (all_above(s.steps, c.last)) {
+            // Written out, so that no call of the C library takes its place: how many instructions that has depends on the processor.
+#pragma GCC unroll 16
             for (int i = most - 1; i > 0; --i) s.mean[i] = s.mean[i - 1];
             s.mean[0] = s.sum;
             s.sum = s.steps = R(0.0);

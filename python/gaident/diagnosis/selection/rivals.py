@@ -51,9 +51,13 @@ def of_each_effect(
         needed = space.penalty if contained else space.margin if first.effect in here else space.policy.swap
         better = first if first.behind < -needed else None
         if better is None:
-            # Of effects that these records cannot tell apart, the simplest of a family is preferred to those outside of it.
-            others = (r for r in rivals if r.effect in here and r.behind < space.margin)
-            better = next((r for r in others if r.term.simplest and r.term.family != term.family), None)
+            # Of effects that these records cannot tell apart, the simplest of a family is preferred to those outside of it, and
+            # dry friction to what has no level.
+            others = [r for r in rivals if r.term.simplest and r.behind < space.margin]
+            better = next((r for r in others if r.effect in here and r.term.family != term.family), None)
+            better = better or next(
+                (r for r in others if r.term.family == term.family and r.term.levels and not term.levels), None
+            )
         if better is None and (first_of := representative(term)) != term.name:
             # Rounding decides between effects that are the same to every record: the first of them has the name.
             better = next((r for r in rivals if r.effect == first_of and r.behind < space.policy.swap), None)

@@ -376,11 +376,14 @@ def _compared(found: _Found, classes: Classes, note: Callable[[str], None]) -> S
     space, final = found.space, found.space.deepened(found.final)
     for swaps_left in range(POLICY.swaps, -1, -1):
         rivals, better = of_each_effect(space, final, swaps_left > 0, classes, note)
-        if better is not None and space.hidden(better, final):
-            rivals, better = of_each_effect(space, final, False, classes, note)
+        if better is not None:
+            other = reduced_by(space.canonical(better), _reductions(space), space.prefers, space.score)
+            lost = len(other.effects) < len(final.effects) and space.score(other) > space.score(final)  # it is a rival only
+            if lost or space.hidden(better, final):
+                rivals, better = of_each_effect(space, final, False, classes, note)
         if better is None:
             break
-        final = reduced_by(space.canonical(better), _reductions(space), space.prefers, space.score)
+        final = other
     base = found.base if found.base.parameters.kind == final.parameters.kind else space.bare(final)
     return Selection(space, base, final, rivals, found.specification, found.whitened)
 
