@@ -77,3 +77,9 @@ class Records:
         DRIVES,
     )
     swing_damping: float = record(0.5, "1", "damping ratio below which two masses swing as on a shaft", DRIVES)
+    driven_damping: float = record(
+        0.1,
+        "1",
+        "damping ratio by which an antiresonance may be damped more than resonance and motor, as that of no shaft is",
+        DRIVES,
+    )

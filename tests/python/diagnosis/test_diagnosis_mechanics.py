@@ -14,7 +14,14 @@ from drive_cases import random_case
 from drive_rig import Plant, run_drive, skip_without_library
 from fine_integrator import FineCase, integrate
 from gaident.diagnosis.mechanics import MECHANICS, moved
-from gaident.diagnosis.selection.mechanisms import balanced_on_a_spring, evenly_damped, is_mechanism, reduced, rigid
+from gaident.diagnosis.selection.mechanisms import (
+    balanced_on_a_spring,
+    evenly_damped,
+    is_mechanism,
+    on_no_shaft,
+    reduced,
+    rigid,
+)
 from gaident.estimation.dataset import DataSet
 from gaident.estimation.noise_model import WHITE
 from gaident.estimation.objective import Fit, Hypothesis
@@ -156,6 +163,25 @@ def test_a_hanging_mass_moved_slowly_against_friction_has_no_wrong_sign() -> Non
     velocity = w + 0.005 * rng.standard_normal(len(t))
     space = derive_space([ga.Record(1e-3, velocity=velocity, torque=torque, position=angle, torque_is="measured")], None)
     assert space.gain[0] < 1000.0 < space.gain[1]
+
+
+def test_two_masses_whose_motor_is_driven_are_on_no_shaft() -> None:
+    """(D_M + D_G)/J_M = a + e1 - f1: an antiresonance that is damped more than resonance and motor together."""
+    shaft = ga.TwoMass(JM=2e-4, DM=1e-3, JL=3e-4, DL=1.5e-3, KG=60.0, DG=2e-3).model()
+    overdamped = ga.TwoMass(JM=2e-4, DM=1e-3, JL=3e-4, DL=1.5e-3, KG=60.0, DG=0.3).model()
+    zeros = tuple(complex(-0.3 * abs(z), z.imag) for z in shaft.zeros)
+    models = {
+        "shaft": shaft,
+        "overdamped": overdamped,
+        "driven": replace(shaft, zeros=zeros),
+        "one": ga.OneMass(5e-4, 1e-3).model(),
+    }
+    found = {}
+    for name, model in models.items():
+        parameters = Parameterisation.of(model, SCALES, [False])
+        hypothesis = Hypothesis(parameters, OpenLoop(swung(0.5)))
+        found[name] = on_no_shaft(Fit(hypothesis, parameters.base_vector(model), WHITE, 1.0, 0.0))
+    assert found == {"shaft": False, "overdamped": True, "driven": True, "one": False}
 
 
 def test_even_damping_leaves_a_drive_of_even_bearings_alone_and_mends_one_that_is_driven() -> None:

@@ -162,6 +162,8 @@ def _no_simulator(monkeypatch: pytest.MonkeyPatch) -> None:
     for module in (model_space, noise_level):
         monkeypatch.setattr(module, "OpenLoop", Toy)
     monkeypatch.setattr(moves, "OpenLoop", Toy)
+    # The base parameters of the toy are sizes of signals, of no shaft.
+    monkeypatch.setattr(model_space, "on_no_shaft", lambda fit: False)
 
 
 class Bench:
@@ -389,6 +391,17 @@ def test_of_effects_that_are_the_same_to_every_record_the_first_has_the_name(mon
     assert better(seen, lag, POLICY.swap + 0.1) is None
     assert better(lag, seen, -0.3) is None
     assert better(lag, seen, -POLICY.swap - 0.1) is seen
+
+
+def test_two_masses_on_no_shaft_take_no_place_of_a_model_that_is_on_one(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Whatever they explain; but effects are added to a linear fit that is on none, as that of a shaft with a gap may be."""
+    bench = Bench({"a": (0.5,)}, base=(1.0, 0.4), masses=2)
+    one, two, more = bench.fit(masses=1), bench.fit(), bench.fit(A)
+    space = bench.space
+    assert space.worth(two, one) and space.worth(more, two) and space.prefers(two, one)
+    monkeypatch.setattr(model_space, "on_no_shaft", lambda fit: fit.parameters.masses == 2)
+    assert not space.worth(two, one) and not space.prefers(two, one)
+    assert space.worth(more, two)
 
 
 def test_of_one_family_dry_friction_has_the_name_before_what_has_no_level(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -12,7 +12,7 @@ from gaident.diagnosis.library.equivalences import equivalents
 from gaident.diagnosis.library.sides import name_of
 from gaident.diagnosis.library.terms import LIBRARY, of_inverse_dynamics
 from gaident.diagnosis.selection.attribution import friction_shown
-from gaident.diagnosis.selection.mechanisms import is_mechanism, one_mass, reduced, resonant, rigid, swings
+from gaident.diagnosis.selection.mechanisms import is_mechanism, on_no_shaft, one_mass, reduced, resonant, rigid, swings
 from gaident.diagnosis.selection.model_space import Grown
 from gaident.diagnosis.selection.moves import Moves
 from gaident.diagnosis.selection.score_test import ScoreTest
@@ -113,7 +113,7 @@ def linear_bases(task: Task) -> tuple[Task, list[Fit]]:
     shaft = ShaftNoise(best.parameters.linear(best.x), task.scales.dt, task.data.pi)
     task = task.under(Innovations(shaft, family.floor))
     one, two = (ls.reestimated(task.objective, f) for f in (one, two))
-    if one.bic < two.bic or not swings(two) or task.scales.blocks > 1:
+    if one.bic < two.bic or on_no_shaft(two) or task.scales.blocks > 1:
         return task, [one, two]
     space = task.space()
     test = ScoreTest(task.objective)
@@ -222,12 +222,18 @@ class ByOutputErrors:
 
 
 def _readings(axis: InverseDynamics, data: DataSet) -> list[dict[str, float]]:
-    """The parameters of the regression, and, where they cannot tell the two apart, with dry friction in the place of an offset.
+    """The parameters of the regression, and with dry friction where it has none.
 
     Of an axis that hardly turns back an offset is a load or dry friction; what it did at rest tells, which a free run shows.
+    Elsewhere dry friction starts from a little: behind the regression's filter a fast motion may not show it.
     """
     values = {name: e.value for name, e in axis.parameters.items()}
-    if "coulomb" not in axis.terms_not_tried or "offset" not in values:
+    if any(name.startswith("coulomb") for name in values):
+        return [values]
+    if "coulomb" not in axis.terms_not_tried:
+        little = POLICY.check_torque * float(np.std(np.concatenate([r.torque for r in data.records if r.torque is not None])))
+        return [values, {**values, "coulomb": little}]
+    if "offset" not in values:
         return [values]
     rest = {name: value for name, value in values.items() if name != "offset"}
     forward = float(sum(r.velocity.sum() for r in data.records)) > 0.0  # no decision: a formula: the direction

@@ -32,6 +32,7 @@ __all__ = [
     "evenly_damped",
     "is_mechanism",
     "on_a_shaft",
+    "on_no_shaft",
     "one_mass",
     "put_on_a_spring",
     "reduced",
@@ -296,6 +297,20 @@ def swings_at(parameters: Parameterisation, x: Vector) -> bool:
     _, _, e1, e0, f1, f0 = parameters.base_values(x[None, :])[0]
     twice = 2.0 * POLICY.swing_damping  # no decision: a formula: 2 zeta w
     return bool(e0 > 0.0 and f0 > 0.0 and abs(e1) < twice * np.sqrt(e0) and abs(f1) < twice * np.sqrt(f0))
+
+
+def on_no_shaft(fit: Fit) -> bool:
+    """Whether two masses do not swing, or are driven at the motor's end: f1 - e1 - a > 2 zeta0 sqrt(f0); False for one.
+
+    (D_M + D_G)/J_M = a + e1 - f1 is positive on every shaft; zeta0 is `driven_damping`.
+    A linear fit of a shaft with a gap may come out so, but no model that explains a record.
+    """
+    if fit.parameters.masses == 1:
+        return False
+    if not swings(fit):
+        return True
+    _, a, e1, _, f1, f0 = fit.parameters.base_values(fit.x[None, :])[0]
+    return bool(f1 - e1 - a > 2.0 * POLICY.driven_damping * np.sqrt(f0))  # no decision: a formula: 2 zeta w
 
 
 def resonance(fit: Fit) -> float:

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from gaident.diagnosis.library.equivalences import equivalents
 from gaident.diagnosis.library.sides import called_of
 from gaident.diagnosis.library.terms import LIBRARY
-from gaident.diagnosis.selection.mechanisms import as_two_masses, resonance, swings
+from gaident.diagnosis.selection.mechanisms import as_two_masses, on_no_shaft, resonance, swings
 from gaident.diagnosis.selection.noise_level import NoiseLevel
 from gaident.estimation import least_squares as ls
 from gaident.estimation.criterion import cost_of, effective_samples, gained_by_chance
@@ -128,7 +128,7 @@ class ModelSpace(NoiseLevel):
     def worth(self, fuller: Fit, simpler: Fit) -> bool:
         """The decision: whether a fuller model is worth its effects against a simpler one."""
         simpler = self.under_predictor_of(simpler, fuller)
-        if not self.score(fuller) < self.score(simpler):
+        if not self.score(fuller) < self.score(simpler) or self.leaves_the_shaft(fuller, simpler):
             return False
         more = [t for t in fuller.parameters.terms if t.name not in simpler.effects]
         if any(fuller.parameters.effect_values(fuller.x[None, :], t.name)[0, 0] < t.least for t in more if t.least):
@@ -138,6 +138,14 @@ class ModelSpace(NoiseLevel):
         if fuller.parameters.on_a_spring and not (simpler.parameters.on_a_spring or self.beyond_simulation(simpler, fuller)):
             return False
         return self.material(simpler, fuller) and self.beyond_torque_noise(simpler, fuller)
+
+    @staticmethod
+    def leaves_the_shaft(other: Fit, fit: Fit) -> bool:
+        """Whether another model has two masses that are on no shaft, and the model has not: it takes no place then.
+
+        A linear fit of a shaft with a gap may be on none: effects are added to that.
+        """
+        return on_no_shaft(other) and not on_no_shaft(fit)
 
     def beyond_torque_noise(self, simpler: Fit, fuller: Fit) -> bool:
         """Whether a fuller model gains more than noise on a measured torque would give it by chance; true without one.

@@ -376,6 +376,8 @@ class Moves(Repeated):
 
     def prefers(self, other: Fit, fit: Fit) -> bool:
         """Whether a reduced model takes the place of a model."""
+        if self.leaves_the_shaft(other, fit):
+            return False
         if len(other.effects) == len(fit.effects) and other.parameters.kind == fit.parameters.kind:
             nested = any(set(t.nested) & set(other.effects) for t in fit.parameters.terms)
             if not nested:

@@ -24,7 +24,7 @@ from gaident.diagnosis.selection.bases import ByOutputErrors, Task, heaviest, li
 from gaident.diagnosis.selection.beam import Beam
 from gaident.diagnosis.selection.beam import reduced as reduced_by
 from gaident.diagnosis.selection.decimated import blocks_of, decimated_objective, moved
-from gaident.diagnosis.selection.mechanisms import drives_itself, resonance, swings
+from gaident.diagnosis.selection.mechanisms import drives_itself, on_no_shaft, resonance, swings
 from gaident.diagnosis.selection.model_space import words
 from gaident.diagnosis.selection.moves import Moves
 from gaident.diagnosis.selection.rivals import Classes, Replacement, of_each_effect
@@ -240,13 +240,17 @@ def _explored(task: Task, space: Moves, bases: Sequence[Fit]) -> tuple[Fit, Fit]
         if space.swings(base) and not space.swings(end):
             end = base  # the search replaced the shaft by effects: the model with the shaft stays a candidate
         # On a coarse grid a resonance beyond what it shows stands for another fast effect: the fit to all samples decides.
-        # Two overdamped masses describe some other effect, which one mass leaves in the error.
         shown = task.scales.blocks == 1 or resonance(end) < POLICY.seen_band * np.pi / task.scales.dt
         if not ends or (space.swings(end) and shown):
             ends.append((base, end))
-        if space.quiet(end) and space.small_unwhitened(end):
+        if space.quiet(end) and space.small_unwhitened(end) and not on_no_shaft(end):
             break
-    return min(ends, key=lambda e: space.score(e[1]))
+    return min(ends, key=lambda e: _rank(space, e[1]))
+
+
+def _rank(space: Moves, fit: Fit) -> tuple[bool, float]:
+    """The lower the better: two masses that are on no shaft describe some other effect, and come after everything else."""
+    return on_no_shaft(fit), space.score(fit)
 
 
 def _searched(space: Moves, base: Fit) -> Fit:
@@ -289,9 +293,11 @@ def _grown(space: Moves, fit: Fit) -> Fit:
 
 def _improved(space: Moves, other: Fit, best: Fit) -> Fit:
     """Another model, reduced and grown, in the place of the best one where it scores better."""
-    if space.score(other) > space.score(best) + space.penalty:
+    if on_no_shaft(other) == on_no_shaft(best) and space.score(other) > space.score(best) + space.penalty:
         return best
     other = _grown(space, other)
+    if on_no_shaft(other) != on_no_shaft(best):
+        return min(other, best, key=on_no_shaft)
     return other if space.score(best) - space.score(other) > space.policy.swap else best
 
 
