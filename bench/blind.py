@@ -50,7 +50,7 @@ from blind_tables import limits_of, report
 from json_lines import read, work
 
 import gaident as ga
-from blind_judge import describes_noise, ends_of, judge, with_ends
+from blind_judge import describes_noise, deviations, ends_of, judge, with_ends
 from drive_cases import (
     ANYWHERE,
     EFFECTS,
@@ -225,7 +225,7 @@ def run(cell: Cell, with_oracle: bool) -> dict[str, Any]:
     line |= {"seconds": time.perf_counter() - started, "judged": judge(with_ends(dia) if both else dia, hidden).as_dict()}
     line |= {"ends": ends_of(dia, tuple(hidden))} if cell.group == "sides" else {}
     line |= {"processor": time.process_time() - processor, "simulations": dia.simulations}
-    line |= {"before": dia.before.rmse, "after": dia.after.rmse}
+    line |= {"before": dia.before.rmse, "after": dia.after.rmse, "deviations": deviations(dia, truth.effects, truth.plant)}
     if cell.torque_noise:
         line |= inertia_of(dia, truth.plant.J + truth.plant.JL)
     of_library = not set(cell.effects) & set(OUTSIDE) and not describes_noise(cell.effects)

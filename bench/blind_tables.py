@@ -311,6 +311,23 @@ def measured_table(lines: list[Line]) -> str:
     return table(head, rows)
 
 
+def coverage_table(lines: list[Line]) -> str:
+    """Of each number, how often the truth is within 1.96 of its stated deviations, by verdict, and how far off it is at most."""
+    verdicts = "adequate", "explained", "partly explained", "unexplained"
+    names = dict.fromkeys(name for x in lines for name in x["deviations"])
+    rows = []
+    for name in [*sorted(names, key=lambda n: ("." in n, n)), "all"]:
+        cells: list[object] = [name]
+        largest = 0.0
+        for verdict in verdicts:
+            some = [x["deviations"] for x in lines if x["judged"]["verdict"] == verdict]
+            off = np.abs([z for each in some for n, z in each.items() if name in (n, "all")])
+            cells.append(rate(int(np.sum(off < 1.96)), len(off)))
+            largest = max(largest, float(np.max(off, initial=0.0)))
+        rows.append([*cells, f"{largest:.2g}"])
+    return table(["within 1.96 deviations", *verdicts, "furthest off, deviations"], rows)
+
+
 def report(lines: list[Line]) -> str:
     """All tables for which there are lines."""
     done = [x for x in lines if "judged" in x]
@@ -340,6 +357,7 @@ def report(lines: list[Line]) -> str:
     add("Ends of an elastic shaft", groups.get("sides", []), sides_table)
     add("Dry friction at both ends of an elastic shaft", groups.get("ends", []), ends_table)
     add("A measured torque that drives the axis", groups.get("measured", []), measured_table)
+    add("Deviations of what was rightly found", [x for x in done if "deviations" in x], coverage_table)
     add("Time of a diagnosis", done, seconds_table)
     crashed = [x for x in lines if "crash" in x]
     add("Crashes", crashed, lambda some: "\n".join(f"- {x['key']}: {x['crash']}" for x in some))

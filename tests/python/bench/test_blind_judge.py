@@ -11,7 +11,8 @@ import numpy as np
 import pytest
 
 import gaident as ga
-from blind_judge import Judgement, judge, with_ends
+from blind_judge import Judgement, deviations, judge, with_ends
+from drive_rig import Plant
 from places import BENCH
 
 sys.path.insert(0, str(BENCH))
@@ -140,3 +141,47 @@ def test_an_interrupted_file_goes_on(tmp_path: Path) -> None:
     path = tmp_path / "results.jsonl"
     path.write_text('{"key": "a", "x": 1}\n{"key": "b", "x"')
     assert list(blind.read(path)) == ["a"]
+
+
+def test_deviations_of_mechanics_and_of_what_is_there() -> None:
+    plant = Plant(J=2e-3, D=1e-2, kp=0.1, ki=1.0, dt=1e-3)
+    wave = {"amplitude": ga.Estimate(-0.05, 0.001, "N m"), "phase": ga.Estimate(-2.0, 0.01, "rad")}
+    unknown = {"torque": ga.Estimate(0.01, 0.02, "N m", identifiable=False)}
+    dia = SimpleNamespace(
+        mechanics={"inertia": ga.Estimate(2.1e-3, 5e-5, "kg m^2")},
+        findings=[
+            SimpleNamespace(effect="unbalance", alternatives=(), is_noise=False, parameters=wave),
+            SimpleNamespace(effect="coulomb_friction", alternatives=(), is_noise=False, parameters=unknown),
+            SimpleNamespace(effect="cogging", alternatives=(), is_noise=False, parameters=wave),
+        ],
+    )
+    hidden = {"unbalance": {"amplitude": 0.052, "phase": np.pi - 2.03}, "coulomb_friction": {"torque": 0.03}}
+    off = deviations(dia, hidden, plant)
+    assert off == {
+        "inertia": pytest.approx(2.0),
+        "unbalance.amplitude": pytest.approx(-2.0),
+        "unbalance.phase": pytest.approx(3.0),
+    }
+
+
+def test_deviations_of_a_shaft_have_its_resonance_and_damping() -> None:
+    shaft = ga.TwoMass(JM=2e-4, DM=1e-3, JL=3e-4, DL=1.5e-3, KG=60.0, DG=2e-3)
+    plant = Plant(shaft.JM, shaft.DM, 0.1, 1.0, 1e-3, shaft.JL, shaft.DL, shaft.KG, shaft.DG)
+    free = ga.TwoMass(2e-4, 0.0, 3e-4, 0.0, 60.0, 0.0)
+    found = {
+        "resonance": ga.Estimate(np.sqrt(free.KG * (1 / free.JM + 1 / free.JL)) / (2 * np.pi), 0.01, "Hz"),
+        "antiresonance": ga.Estimate(np.sqrt(free.KG / free.JL) / (2 * np.pi), 0.01, "Hz"),
+        "stiffness": ga.Estimate(61.0, 0.5, "N m/rad"),
+    }
+    off = deviations(SimpleNamespace(mechanics=found, findings=[]), {}, plant)
+    assert off["stiffness"] == pytest.approx(2.0) and abs(off["resonance"]) < 3.0 and abs(off["antiresonance"]) < 3.0
+
+
+def test_coverage_counts_by_verdict() -> None:
+    lines = [
+        {"judged": {"verdict": verdict}, "deviations": {"inertia": z, "cogging.order": 0.1}}
+        for verdict, z in (("explained", 1.0), ("explained", -2.5), ("partly explained", 9.0))
+    ]
+    rows = {line.split(" | ")[0].strip("| "): line for line in blind_tables.coverage_table(lines).splitlines()[2:]}
+    assert "1/2 = 50.0 %" in rows["inertia"] and "0/1 = 0.0 %" in rows["inertia"] and rows["inertia"].endswith("| 9 |")
+    assert "3/4 = 75.0 %" in rows["all"] and next(iter(rows)) == "inertia"

@@ -6,13 +6,15 @@ Findings that only describe the record's noise do not count, unless that is what
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable
 from dataclasses import asdict, dataclass, field, replace
 from types import SimpleNamespace
 from typing import Any
 
+import gaident as ga
 from drive_cases import NOISE_EFFECTS
-from drive_rig import AT_LOAD, OUTSIDE
+from drive_rig import AT_LOAD, OUTSIDE, Plant
 
 # Truth -> what no record of command, velocity and torque can tell from it: always reported together.
 EQUIVALENT = {"torque_lag": "velocity_filter", "velocity_filter": "torque_lag"}
@@ -118,3 +120,41 @@ def driver_right(judged: Judgement) -> bool:
 
 def describes_noise(truth: tuple[str, ...]) -> bool:
     return bool(set(truth) & set(NOISE_EFFECTS))
+
+
+def mechanics_of(plant: Plant) -> dict[str, float]:
+    """Name -> value, as a diagnosis names them."""
+    found = {"inertia": plant.J + plant.JL, "viscous_friction": plant.D + plant.DL}
+    if not plant.two_masses:
+        return found
+    model = ga.TwoMass(plant.J, plant.D, plant.JL, plant.DL, plant.KG, plant.DG).model()
+    found |= {"motor_inertia": plant.J, "load_inertia": plant.JL, "stiffness": plant.KG}
+    for name, roots in (("resonance", model.poles), ("antiresonance", model.zeros)):
+        root = max(roots, key=lambda s: s.imag)
+        found |= {name: abs(root) / (2.0 * math.pi), f"{name}_damping": -root.real / abs(root)}
+    return found
+
+
+def deviations(dia: Any, effects: dict[str, dict[str, float]], plant: Plant) -> dict[str, float]:
+    """ "name" or "effect.parameter" -> (value - truth) over its standard deviation, of mechanics and of effects that are there.
+
+    Left out is what the diagnosis calls not determined, and the mechanics of a shaft where the found drive is of one mass.
+    An amplitude counts by its size, whose sign is half a turn of the phase.
+    """
+    pairs = [(name, dia.mechanics[name], true, "") for name, true in mechanics_of(plant).items() if name in dia.mechanics]
+    hidden = {key.removesuffix(AT_LOAD): values for key, values in effects.items()}
+    for finding in counted(dia.findings, tuple(hidden)):
+        true = hidden.get(finding.effect, {})
+        turned = "amplitude" in finding.parameters and finding.parameters["amplitude"].value < 0.0
+        pairs += [(f"{finding.effect}.{n}", e, true[n], n + "!" * turned) for n, e in finding.parameters.items() if n in true]
+    found = {}
+    for name, estimate, true, kind in pairs:
+        if not (estimate.identifiable and 0.0 < estimate.std < math.inf):
+            continue
+        error = estimate.value - true
+        if kind == "amplitude!":
+            error = -estimate.value - true
+        if kind.rstrip("!") in ANGLES:
+            error = math.remainder(error + math.pi * kind.endswith("!"), 2.0 * math.pi)
+        found[name] = error / estimate.std
+    return found

@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import sys
 from collections.abc import Callable
+from functools import partial
 from importlib.util import find_spec
 from pathlib import Path
 from shlex import quote
@@ -23,7 +24,7 @@ def demo_command(args: argparse.Namespace) -> None:
 
     folder = Path(args.out)
     folder.mkdir(parents=True, exist_ok=True)
-    say: Callable[[str], None] = (lambda text: None) if args.json else print
+    say: Callable[[str], None] = (lambda text: None) if args.json else partial(print, flush=True)
     drawn = find_spec("matplotlib") is not None
     truth, controller = demonstration.TRUTH, demonstration.CONTROLLER
     say(demonstration.STORY)
