@@ -2,6 +2,13 @@
 
 Whitened, least squares has the covariance s^2 (J J')^-1 over x; parameters in the table's own units follow to first order.
 
+What a model gets wrong is no such noise: it is large where the motion is, and goes on for longer than any filter knows.
+No deviation is smaller than that of the covariance which holds for errors of any kind (White 1980; Newey and West 1987),
+
+    (J J')^-1 S (J J')^-1,   S the long-run covariance of J v (`regression.long_run`)
+
+H. White, Econometrica 48(4):817-838, 1980.
+
 Beside a gap these are too small: x changes the times of the impacts, and a slope at one point does not show that.
 There every standard deviation is at least that of the jackknife over K blocks of the records,
 
@@ -14,6 +21,7 @@ On one gap under a coloured torque, whose impacts no model predicts, the error w
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -24,6 +32,7 @@ from gaident.estimation.found_numbers import of_ages, of_numbers, variance_of
 from gaident.estimation.least_squares import fit as fitted
 from gaident.estimation.objective import Fit, Objective
 from gaident.estimation.projection import inverse_of
+from gaident.estimation.regression.regression import long_run
 from gaident.models.effects import row_of
 from gaident.models.factors import model_numbers
 from gaident.models.model import Model
@@ -32,6 +41,7 @@ from gaident.results.estimate import Estimate
 
 __all__ = ["age_part", "controller_part", "covariance_of", "estimates_of", "model_covariance"]
 
+TINY = 1e-300  # no decision: no division by 0
 BLOCKS = 8  # no decision: how many parts of a jackknife
 
 Vector = NDArray[np.float64]
@@ -55,7 +65,7 @@ def age_part(objective: Objective, fit: Fit) -> Matrix:
 
 
 def _covariance(objective: Objective, fit: Fit) -> Matrix:
-    return _of_the_errors(objective, fit) + controller_part(objective, fit)
+    return _of_the_errors(objective, fit) + _of_the_steps(objective, fit) + controller_part(objective, fit)
 
 
 def _of_the_errors(objective: Objective, fit: Fit) -> Matrix:
@@ -67,6 +77,24 @@ def _of_the_errors(objective: Objective, fit: Fit) -> Matrix:
     larger = np.ones(len(local))
     larger[known] = np.maximum(_jackknife(objective, fit)[known] / local[known], 1.0)
     return cov * np.outer(larger, larger)
+
+
+def _of_the_steps(objective: Objective, fit: Fit) -> Matrix:
+    """The square of what the steps of the simulation move in x, to first order; 0 where they are as fine as they get."""
+    data = fit.predictor.data
+    finer = replace(data, finest=0.5 * data.finest)  # no decision: half a step
+    part = np.zeros((len(fit.x), len(fit.x)))
+    if not fit.effects or finer.substeps(data.loop) == data.substeps(data.loop):
+        return part
+    v, J = objective.linearised(fit.hypothesis, fit.x, fit.noise)
+    seen = np.flatnonzero((fit.parameters.steps() > 0.0) & np.all(np.isfinite(J), axis=1) & np.any(J != 0.0, axis=1))
+    error = objective.errors(fit.hypothesis.over(finer), fit.x[None, :])
+    changed = objective.whitened(error, fit.noise, objective.inertias(fit.hypothesis, fit.x[None, :]))[0] - v
+    if len(seen) and np.all(np.isfinite(changed)):
+        # An error of first order in the step is twice what half the step changes; one of second order, 4/3 of it.
+        move = 2.0 * inverse_of(J[seen] @ J[seen].T) @ (J[seen] @ changed)
+        part[np.ix_(seen, seen)] = np.outer(move, move)
+    return part
 
 
 def _jackknife(objective: Objective, fit: Fit) -> Vector:
@@ -89,7 +117,11 @@ def _at_one_point(objective: Objective, fit: Fit) -> Matrix:
     for i in moved:
         cov[i, i] = np.inf
     if seen:
-        cov[np.ix_(seen, seen)] = variance_of(objective, fit, v) * inverse_of(J[seen] @ J[seen].T)
+        bread = inverse_of(J[seen] @ J[seen].T)
+        scores = np.split((J[seen] * v).T, np.cumsum(objective.lengths)[:-1])
+        stationary, robust = variance_of(objective, fit, v) * bread, bread @ np.sum([long_run(s) for s in scores], axis=0) @ bread
+        larger = np.sqrt(np.maximum(np.diag(robust) / np.maximum(np.diag(stationary), TINY), 1.0))
+        cov[np.ix_(seen, seen)] = stationary * np.outer(larger, larger)
     return cov
 
 

@@ -245,12 +245,8 @@ def _explored(task: Task, space: Moves, bases: Sequence[Fit]) -> tuple[Fit, Fit]
             ends.append((base, end))
         if space.quiet(end) and space.small_unwhitened(end) and not on_no_shaft(end):
             break
-    return min(ends, key=lambda e: _rank(space, e[1]))
-
-
-def _rank(space: Moves, fit: Fit) -> tuple[bool, float]:
-    """The lower the better: two masses that are on no shaft describe some other effect, and come after everything else."""
-    return on_no_shaft(fit), space.score(fit)
+    # Two masses that are on no shaft describe some other effect, and come after everything else.
+    return min(ends, key=lambda e: (on_no_shaft(e[1]), space.score(e[1])))
 
 
 def _searched(space: Moves, base: Fit) -> Fit:

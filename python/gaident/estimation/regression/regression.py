@@ -39,6 +39,22 @@ def solve(X: Matrix, y: Vector) -> tuple[Vector, int]:
     return np.asarray(theta / length), int(rank)
 
 
+def long_run(scores: Matrix) -> Matrix:
+    """Covariance (k, k) of the sum of the scores (n, k) of one record, with Bartlett's weights over L lags (see above).
+
+        S = sum_(|l| <= L) (1 - |l|/(L+1)) sum_n s(n) s(n+l)' = 1/(L+1) sum_t B(t) B(t)',   B(t) = s(t) + ... + s(t+L)
+
+    B is the sum over a window that slides over the record, its ends included.
+    """
+    n = len(scores)
+    window = min(int(np.ceil(POLICY.lags_per_root * np.sqrt(n))), n - 1) + 1
+    sums = np.zeros((n + 2 * window - 1, scores.shape[1]))
+    sums[window : window + n] = np.cumsum(scores, axis=0)
+    sums[window + n :] = sums[window + n - 1]
+    sliding = sums[window:] - sums[:-window]
+    return np.asarray(sliding.T @ sliding / window)
+
+
 def covariance(X: Sequence[Matrix], residuals: Sequence[Vector]) -> Matrix:
     """Covariance (k, k) of the solution; X (n_i, k) and residuals (n_i,) by record, which are independent of each other.
 
@@ -54,12 +70,7 @@ def covariance(X: Sequence[Matrix], residuals: Sequence[Vector]) -> Matrix:
     inverse = (vectors[:, known] / values[known]) @ vectors[:, known].T
     middle = np.zeros((k, k))
     for part, r in zip(X, residuals, strict=True):
-        scores = part / scale * r[:, None]
-        middle += scores.T @ scores
-        for lag in range(1, min(int(np.ceil(POLICY.lags_per_root * np.sqrt(len(r)))), len(r) - 1) + 1):
-            weight = 1.0 - lag / (np.ceil(POLICY.lags_per_root * np.sqrt(len(r))) + 1.0)
-            product = scores[lag:].T @ scores[:-lag]
-            middle += weight * (product + product.T)
+        middle += long_run(part / scale * r[:, None])
     robust = inverse @ middle @ inverse
     white = inverse * (sum(float(r @ r) for r in residuals) / max(n - k, 1))
     # No smaller than white: both deviations are estimates, and the larger one is the safer.
