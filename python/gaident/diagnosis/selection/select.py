@@ -18,7 +18,6 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gaident.diagnosis.selection.bases import ByOutputErrors, Task, heaviest, linear_bases, noise_floor, output_error_bases
 from gaident.diagnosis.selection.beam import Beam
@@ -37,8 +36,6 @@ from gaident.models.model import Model
 from gaident.policy.table import POLICY
 
 __all__ = ["Selection", "by_whitened_errors", "compared", "selected", "specification"]
-
-Vector = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
@@ -161,9 +158,9 @@ def _decided(task: Task, note: Callable[[str], None]) -> _Found:
             base, final = space.bare(better), better
         test = specification(space, task, final)
         by_output = _offered(by_output, final)
-    whitened = _Found(space, base, final, test)
     if by_output is None:
-        return whitened
+        return _Found(space, base, final, test)
+    whitened = _Found(space, base, final, test)
     impossible = bool(by_output.final.effects) and drives_itself(final) and not space.small_unwhitened(final)
     if test.contradicts or impossible or not space.is_noise(final) or by_output.space.hidden(final, by_output.final):
         return replace(by_output, specification=test, whitened=whitened)
