@@ -2,6 +2,7 @@
 
     python bench/real.py --out real.jsonl [--workers 2] [--only TEXT ...] [--skip-diagnosis | --skip-plain]
     python bench/real.py --out real.jsonl --report          # tables only, from what is there
+    python bench/real.py --out real.jsonl --evidence        # those of docs/evidence.md
     python bench/real.py --out new.jsonl --check            # fails where an answer is worse than in real_expected.py
 
 Every finished part of a case is a line of the file: stop at will, start again and it goes on.
@@ -35,7 +36,7 @@ from json_lines import read, work
 from real_expected import worse
 from real_judge import judge, said
 from real_records import Case, Drive, Parts, cases, missing, parts_of
-from real_tables import assert_published, report
+from real_tables import assert_published, evidence, report
 
 import gaident as ga
 
@@ -147,12 +148,15 @@ def main() -> None:
     which.add_argument("--skip-diagnosis", action="store_true")
     which.add_argument("--skip-plain", action="store_true")
     parser.add_argument("--report", action="store_true")
+    parser.add_argument("--evidence", action="store_true", help="the tables of docs/evidence.md, from what is there")
     parser.add_argument("--check", action="store_true", help="exit code 1 where an answer is worse than in real_expected.py")
     options = parser.parse_args()
     if options.check and options.skip_diagnosis:
         parser.error("--check asserts what the diagnosis says: leave --skip-diagnosis out")
     options.out.parent.mkdir(parents=True, exist_ok=True)
     there = read(options.out)
+    if options.evidence:
+        return print(evidence(there))
     chosen = [case for case in cases() if any(text in case.key for text in options.only)]
     absent: dict[str, list[str]] = {}
     for case in chosen if options.check else []:

@@ -15,6 +15,28 @@ BOXES = ("ARX", "NARX")
 OUTCOMES = ("right", "in set", "wrong", "missed")
 CLOSE, MUCH = 1.05, 10.0
 
+KNOWN = {
+    "emps": "95.15 kg; dry friction 20.1 and 20.6 N, viscous 167 and 240 N s/m by direction [1]",
+    "emps window": "the same axis, the first of five windows of 12 400 samples",
+    "emps pulses": "the same axis; pulses of force that the log lacks",
+    "joint 1": "dry friction 12.55 N m, viscous 21.26 N m s/rad [2]",
+    "joint 2": "dry friction 13.27 N m, viscous 20.22 N m s/rad [2]; gravity: 113 N m by our least squares",
+    "joint 6": "dry friction 2.30 N m, viscous 3.03 N m s/rad [2]",
+    "hsm150 measured": "inertia 1.2e-4 kg m^2, viscous 7e-5 N m s/rad [3]; dry friction by our least squares 0.041 and 0.027 N m",
+    "hsm150 commanded": "the same axis",
+    "actuator 1": "dry friction 0.310, at rest 0.793 N m, viscous 0.087 N m s/rad [4]",
+    "actuator 2": "dry friction 0.304, at rest 0.682 N m, viscous 0.045 N m s/rad [4]",
+    "actuator 3": "dry friction 0.452, at rest 0.540 N m, viscous 0.109 N m s/rad [4]",
+    "actuator 4": "dry friction 0.491, at rest 0.573 N m, viscous 0.109 N m s/rad [4]",
+    "epos 1": "friction of bearing and thread, at steady speeds [5]",
+    "epos 2": "friction of bearing and thread, at steady speeds [5]",
+    "epos 3": "friction of bearing and thread, at steady speeds [5]",
+    "ced 11": "nothing can be told: the sensor loses the sign [6]",
+    "ced 12": "nothing can be told: the sensor loses the sign [6]",
+    "rack and pinion": "dry friction or a load: the speed never changes its sign [7]",
+}
+"""Drive -> what its makers or others found, and what our own least squares say; numbers are the sources of docs/evidence.md."""
+
 Lines = Mapping[str, Mapping[str, Any]]
 
 # case -> method -> place of the parameter in (J, B+, B-, C+, C-, T, As, Ac) or its name -> (value, relative tolerance).
@@ -102,6 +124,46 @@ def report(lines: Lines) -> str:
         _sums(lines),
     ]
     return "\n\n".join(parts)
+
+
+def evidence(lines: Lines) -> str:
+    """The tables of docs/evidence.md: what is known and what is said of each record, and the errors on held-out data."""
+    said, errors = [], []
+    for drive, row in DRIVES.items():
+        found = {v: lines.get(f"{drive}/{v}/diagnosis", {}) for v in row.variations}
+        names = Counter(line["judged"]["name"] for line in found.values() if "judged" in line)
+        first, *_ = found.values()
+        if not first:
+            continue
+        same = f"{names.most_common(1)[0][1]} of {names.total()}" if names and len(row.variations) > 1 else ""
+        if "said" in first:
+            what = first["said"]
+            words = [*_axis(what), *(_finding(f) for f in what["findings"] if not f["is_noise"])]
+            said.append([drive, KNOWN.get(drive, ""), "; ".join(words) or "nothing", what["verdict"], same])
+        else:
+            said.append([drive, KNOWN.get(drive, ""), first.get("crash", ""), "", same])
+        key = f"{drive}/{row.variations[0]}"
+        if (plain := chosen_plain(lines, key)) is not None:
+            figures = {m: method_of(lines, key, m) for m in ("linear", plain, *BOXES, "extended")}
+            forces = [_number(figures[m].get("force")) for m in (plain, "extended")]
+            errors.append([drive, *(_number(f.get("velocity")) for f in figures.values()), *forces])
+    heads = ["record", "what is known", "what is said", "verdict", "the same over its variations"]
+    methods = ["linear", "plain", *BOXES, "gaident", "force: plain", "force: gaident"]
+    return f"{_table(heads, said)}\n\n{_table(['record', *methods], errors)}"
+
+
+def _axis(what: Mapping[str, Any]) -> list[str]:
+    """Inertia and viscous friction of a rigid axis, in words; those of an effect come on top."""
+    if len(what["poles"]) != 1 or not any(not f["is_noise"] for f in what["findings"]):
+        return []
+    return [f"inertia {1.0 / abs(what['gain']):.3g}, viscous friction {-what['poles'][0][0] / abs(what['gain']):.3g}"]
+
+
+def _finding(found: Mapping[str, Any]) -> str:
+    """A finding with its alternatives and numbers."""
+    names = " or ".join(n.replace("_", " ") for n in (found["effect"], *found["alternatives"]))
+    values = ", ".join(f"{name.replace('_', ' ')} {value:.3g}" for name, value in found["parameters"].items())
+    return f"{names} ({values})"
 
 
 def _table(head: list[str], rows: list[list[str]]) -> str:

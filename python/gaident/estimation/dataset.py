@@ -49,7 +49,8 @@ class DataSet:
     controller: what closed the loop on the drive; None: unknown, the torque drives the model. `loop` is what a simulation closes.
     turned: the record itself with that angle; free: torque-driven, without an angle that was not measured.
     read: the records as the controller read them, which may contain samples that the fit leaves out.
-    finest: no substep of a simulation is much shorter [s]; resolution: step of the lattice of all velocities [rad/s], 0: none.
+    finest: no substep of a simulation is much shorter [s]; finer: times as many are taken.
+    resolution: step of the lattice of all velocities [rad/s], 0: none.
     known_noise: standard deviation of the velocity's noise where the records cannot show it; axis: "rotary" or "linear".
     loop_follows: whether the logged torque is what the controller makes; torque_measured: it was measured, behind the actuator.
     period: of what depends on the place [rad, m], orders count in it; None: not known. period_seen: it is what the records show.
@@ -69,6 +70,7 @@ class DataSet:
     spoiled: bool = False
     read: tuple[Record, ...] = ()
     finest: float = FINEST
+    finer: int = 1
     resolution: float = 0.0
     known_noise: float | None = None
     loop_follows: bool = True
@@ -168,7 +170,7 @@ class DataSet:
     def substeps(self, controller: Controller | None) -> int:
         """Substeps for every model with effects that are not smooth: of a sample of the log, or of one of the controller's."""
         sample = self.dt if controller is None else self.dt / controller.log_every(self.dt)
-        return int(2 ** min(max(math.ceil(math.log2(sample / self.finest)), 0), MOST_SUBSTEPS))
+        return self.finer * int(2 ** min(max(math.ceil(math.log2(sample / self.finest)), 0), MOST_SUBSTEPS))
 
     @property
     def loop_only(self) -> bool:

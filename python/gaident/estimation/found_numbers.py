@@ -39,6 +39,7 @@ from gaident.models.drive_torque import driven_by, torque_of
 from gaident.policy.table import POLICY
 
 __all__ = [
+    "answers",
     "covariance_of_numbers",
     "moved",
     "numbers_in",
@@ -46,6 +47,7 @@ __all__ = [
     "of_controller",
     "of_numbers",
     "refined",
+    "seen_in",
     "slopes",
     "variance_of",
     "worth",
@@ -99,10 +101,10 @@ def of_controller(objective: Objective, fit: Fit) -> Matrix:
 def of_numbers(objective: Objective, fit: Fit) -> Matrix:
     """The part of the numbers of the controller that were found; 0 where none were."""
     v, J = objective.linearised(fit.hypothesis, fit.x, fit.noise)
-    part, seen = np.zeros((len(fit.x), len(fit.x))), _seen(fit, J)
+    part, seen = np.zeros((len(fit.x), len(fit.x))), seen_in(fit, J)
     if len(seen) and fit.predictor.data.found is not None:
         E = _changes(objective, fit.hypothesis, fit.x, fit.noise, v)
-        S = _answers(J[seen], E)
+        S = answers(J[seen], E)
         part[np.ix_(seen, seen)] = S @ _spread(objective, fit, v, J, E) @ S.T
     return part
 
@@ -111,13 +113,13 @@ def of_ages(objective: Objective, fit: Fit) -> Matrix:
     """The part of an age of the velocity that the model does not exclude; 0 where there is one alone."""
     J = objective.linearised(fit.hypothesis, fit.x, fit.noise)[1]
     others = [f.x - fit.x for age in fit.predictor.data.other_ages if (f := _of_age(objective, fit, age)) is not None]
-    if not len(_seen(fit, J)) or not others:
+    if not len(seen_in(fit, J)) or not others:
         return np.zeros((len(fit.x), len(fit.x)))
     furthest = max(others, key=lambda move: float(np.sum((move @ J) ** 2)))
     return np.outer(furthest, furthest)
 
 
-def _seen(fit: Fit, J: Matrix) -> NDArray[np.intp]:
+def seen_in(fit: Fit, J: Matrix) -> NDArray[np.intp]:
     """The coordinates that a fit moves and that show in the errors, of the slopes J."""
     moved = np.flatnonzero(fit.parameters.steps() > 0.0)
     return np.array([i for i in moved if np.all(np.isfinite(J[i])) and np.any(J[i])], dtype=np.intp)
@@ -208,7 +210,7 @@ def _changes(objective: Objective, hypothesis: Hypothesis, x: Vector, noise: Noi
     return np.array([_change(objective, hypothesis, x, noise, v, by) for by in directions]).reshape(len(directions), len(v))
 
 
-def _answers(J: Matrix, E: Matrix) -> Matrix:
+def answers(J: Matrix, E: Matrix) -> Matrix:
     """(k, m): how the coordinates with the slopes J (k, samples) move where the errors change by E (m, samples)."""
     return np.asarray(-inverse_of(J @ J.T) @ (J @ E.T))
 

@@ -3,7 +3,8 @@
 Whitened, least squares has the covariance s^2 (J J')^-1 over x; parameters in the table's own units follow to first order.
 
 What a model gets wrong is no such noise: it is large where the motion is, and goes on for longer than any filter knows.
-No deviation is smaller than that of the covariance which holds for errors of any kind (White 1980; Newey and West 1987),
+No deviation is smaller than that of the covariance which holds for errors of any size and colour whose memory is short beside the
+record (White 1980; Newey and West 1987), neither of x nor of any number that follows from it,
 
     (J J')^-1 S (J J')^-1,   S the long-run covariance of J v (`regression.long_run`)
 
@@ -28,11 +29,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gaident.errors import ModelError
-from gaident.estimation.found_numbers import of_ages, of_numbers, variance_of
+from gaident.estimation.found_numbers import answers, of_ages, of_numbers, seen_in, variance_of
 from gaident.estimation.least_squares import fit as fitted
-from gaident.estimation.objective import Fit, Objective
+from gaident.estimation.objective import LOST, Fit, Objective
 from gaident.estimation.projection import inverse_of
-from gaident.estimation.regression.regression import long_run
+from gaident.estimation.regression.regression import larger_of, long_run
 from gaident.models.effects import row_of
 from gaident.models.factors import model_numbers
 from gaident.models.model import Model
@@ -41,7 +42,6 @@ from gaident.results.estimate import Estimate
 
 __all__ = ["age_part", "controller_part", "covariance_of", "estimates_of", "model_covariance"]
 
-TINY = 1e-300  # no decision: no division by 0
 BLOCKS = 8  # no decision: how many parts of a jackknife
 
 Vector = NDArray[np.float64]
@@ -65,11 +65,12 @@ def age_part(objective: Objective, fit: Fit) -> Matrix:
 
 
 def _covariance(objective: Objective, fit: Fit) -> Matrix:
-    return _of_the_errors(objective, fit) + _of_the_steps(objective, fit) + controller_part(objective, fit)
+    v, J = objective.linearised(fit.hypothesis, fit.x, fit.noise)
+    return _of_the_errors(objective, fit, v, J) + _of_the_steps(objective, fit, v, J) + controller_part(objective, fit)
 
 
-def _of_the_errors(objective: Objective, fit: Fit) -> Matrix:
-    cov = _at_one_point(objective, fit)
+def _of_the_errors(objective: Objective, fit: Fit, v: Vector, J: Matrix) -> Matrix:
+    cov = _at_one_point(objective, fit, v, J)
     if not fit.impacts:
         return cov
     local = np.sqrt(np.diag(cov))
@@ -79,20 +80,17 @@ def _of_the_errors(objective: Objective, fit: Fit) -> Matrix:
     return cov * np.outer(larger, larger)
 
 
-def _of_the_steps(objective: Objective, fit: Fit) -> Matrix:
-    """The square of what the steps of the simulation move in x, to first order; 0 where they are as fine as they get."""
-    data = fit.predictor.data
-    finer = replace(data, finest=0.5 * data.finest)  # no decision: half a step
-    part = np.zeros((len(fit.x), len(fit.x)))
-    if not fit.effects or finer.substeps(data.loop) == data.substeps(data.loop):
+def _of_the_steps(objective: Objective, fit: Fit, v: Vector, J: Matrix) -> Matrix:
+    """The square of what the steps of the simulation move in x, to first order; 0 beside impacts, whose times they change."""
+    part, seen = np.zeros((len(fit.x), len(fit.x))), seen_in(fit, J)
+    if not fit.effects or fit.impacts or not len(seen):
         return part
-    v, J = objective.linearised(fit.hypothesis, fit.x, fit.noise)
-    seen = np.flatnonzero((fit.parameters.steps() > 0.0) & np.all(np.isfinite(J), axis=1) & np.any(J != 0.0, axis=1))
-    error = objective.errors(fit.hypothesis.over(finer), fit.x[None, :])
-    changed = objective.whitened(error, fit.noise, objective.inertias(fit.hypothesis, fit.x[None, :]))[0] - v
-    if len(seen) and np.all(np.isfinite(changed)):
+    finer = fit.hypothesis.over(replace(fit.predictor.data, finer=2))  # no decision: half a step
+    error = objective.errors(finer, fit.x[None, :])
+    if np.abs(error).max() < LOST:
+        changed = objective.whitened(error, fit.noise, objective.inertias(fit.hypothesis, fit.x[None, :]))[0] - v
         # An error of first order in the step is twice what half the step changes; one of second order, 4/3 of it.
-        move = 2.0 * inverse_of(J[seen] @ J[seen].T) @ (J[seen] @ changed)
+        move = 2.0 * answers(J[seen], changed)
         part[np.ix_(seen, seen)] = np.outer(move, move)
     return part
 
@@ -108,20 +106,13 @@ def _jackknife(objective: Objective, fit: Fit) -> Vector:
     return np.asarray(np.sqrt((BLOCKS - 1) * np.var(fits, axis=0)))
 
 
-def _at_one_point(objective: Objective, fit: Fit) -> Matrix:
-    v, J = objective.linearised(fit.hypothesis, fit.x, fit.noise)
-    moved = np.flatnonzero(fit.parameters.steps() > 0.0)
-    sizes = np.sqrt(np.einsum("ij,ij->i", J, J))
-    cov = np.zeros((len(fit.x), len(fit.x)))
-    seen = [i for i in moved if sizes[i] > 0.0 and np.isfinite(sizes[i])]
-    for i in moved:
-        cov[i, i] = np.inf
-    if seen:
+def _at_one_point(objective: Objective, fit: Fit, v: Vector, J: Matrix) -> Matrix:
+    cov, seen = np.diag(np.where(fit.parameters.steps() > 0.0, np.inf, 0.0)), seen_in(fit, J)
+    if len(seen):
         bread = inverse_of(J[seen] @ J[seen].T)
         scores = np.split((J[seen] * v).T, np.cumsum(objective.lengths)[:-1])
-        stationary, robust = variance_of(objective, fit, v) * bread, bread @ np.sum([long_run(s) for s in scores], axis=0) @ bread
-        larger = np.sqrt(np.maximum(np.diag(robust) / np.maximum(np.diag(stationary), TINY), 1.0))
-        cov[np.ix_(seen, seen)] = stationary * np.outer(larger, larger)
+        robust = bread @ np.sum([long_run(s) for s in scores], axis=0) @ bread
+        cov[np.ix_(seen, seen)] = larger_of(variance_of(objective, fit, v) * bread, robust)
     return cov
 
 

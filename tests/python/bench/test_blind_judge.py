@@ -177,6 +177,17 @@ def test_deviations_of_a_shaft_have_its_resonance_and_damping() -> None:
     assert off["stiffness"] == pytest.approx(2.0) and abs(off["resonance"]) < 3.0 and abs(off["antiresonance"]) < 3.0
 
 
+def test_deviations_of_an_effect_at_both_ends_are_of_each_end() -> None:
+    ends = [
+        ga.Finding("coulomb_friction", {"torque": ga.Estimate(torque, 1e-3, "N m")}, sides=(side,))
+        for side, torque in (("load", 0.021), ("motor", 0.05))
+    ]
+    hidden = {"coulomb_friction": {"torque": 0.05}, "coulomb_friction@load": {"torque": 0.02}}
+    dia = SimpleNamespace(mechanics={}, findings=ends, verdict="explained", driver=None)
+    off = deviations(dia, hidden, Plant(2e-3, 1e-2, 0.1, 1.0, 1e-3))
+    assert off == {"coulomb_friction.torque": pytest.approx(0.0), "coulomb_friction@load.torque": pytest.approx(1.0)}
+
+
 def test_coverage_counts_by_verdict() -> None:
     lines = [
         {"judged": {"verdict": verdict}, "deviations": {"inertia": z, "cogging.order": 0.1}}
@@ -185,3 +196,28 @@ def test_coverage_counts_by_verdict() -> None:
     rows = {line.split(" | ")[0].strip("| "): line for line in blind_tables.coverage_table(lines).splitlines()[2:]}
     assert "1/2 = 50.0 %" in rows["inertia"] and "0/1 = 0.0 %" in rows["inertia"] and rows["inertia"].endswith("| 9 |")
     assert "3/4 = 75.0 %" in rows["all"] and next(iter(rows)) == "inertia"
+
+
+def test_the_tables_of_the_evidence_page() -> None:
+    """Inertia and friction of the whole axis stand before the findings; a crash is an answer, too."""
+    sys.path.insert(0, str(BENCH / "measured"))
+    import real_tables
+
+    found = {"effect": "asymmetric_friction", "alternatives": ["load_torque"], "is_noise": False}
+    found["parameters"] = {"torque_positive": 20.1, "viscous_negative": 75.0}
+    what = {"verdict": "partly explained", "findings": [found], "gain": 0.01, "poles": [[-2.0, 0.0]]}
+    methods = {"rigid": {"velocity": 0.3, "training": 0.2, "force": 0.1}, "regression": {"velocity": 0.2, "training": 0.4}}
+    lines: dict[str, Any] = {
+        "emps/whole/diagnosis": {
+            "said": what,
+            "judged": {"name": "friction"},
+            "methods": {"extended": {"velocity": 0.1, "force": 0.05, "training": 0.1}},
+        },
+        "emps/whole/plain": {"methods": {**methods, "linear": {"velocity": 0.9}}},
+        "joint 1/whole/diagnosis": {"crash": "ValueError: no"},
+    }
+    rows = [line for line in real_tables.evidence(lines).splitlines() if line.startswith(("| emps ", "| joint 1 "))]
+    said, crash, errors = ([cell.strip() for cell in row.strip("|").split("|")] for row in rows)
+    expected = "inertia 100, viscous friction 200; asymmetric friction or load torque (torque positive 20.1, viscous negative 75)"
+    assert said[2:] == [expected, "partly explained", ""] and crash[2] == "ValueError: no"
+    assert errors[1:] == ["0.9", "0.3", "", "", "0.1", "0.1", "0.05"]

@@ -418,6 +418,8 @@ def test_of_one_family_dry_friction_has_the_name_before_what_has_no_level(monkey
     assert better(drag, level, bench.space.margin - 0.1) is level
     assert better(drag, level, bench.space.margin + 0.1) is None
     assert better(level, drag, 0.3) is None
+    assert better(level, drag, 0.1 - bench.space.margin) is None, "and it does not come back"
+    assert better(level, drag, -0.1 - bench.space.margin) is drag
     assert better(bench.fit(A), level, 0.3) is None, "another family"
 
 
@@ -426,11 +428,15 @@ def test_a_rival_that_loses_its_effect_and_is_worse_takes_no_place(monkeypatch: 
     bench = Bench({"a": (0.5,)})
     final, rival = bench.fit(A), bench.fit(B)
     found = select._Found(bench.space, bench.fit(), final)
-    monkeypatch.setattr(
-        select, "of_each_effect", lambda space, fit, may_swap, *more: ({"a": (90.0, [])}, rival if may_swap else None)
-    )
+    asked = []
+
+    def of_each(space: object, fit: Fit, may_swap: bool, classes: object, note: object, kept: frozenset[str]) -> object:
+        asked.append(kept)
+        return {"a": (90.0, [])}, rival if may_swap and "a" not in kept else None
+
+    monkeypatch.setattr(select, "of_each_effect", of_each)
     kept = select._compared(found, lambda effect: (), lambda message: None)
-    assert kept.final is final
+    assert kept.final is final and asked == [set(), {"a"}], "the rivals of other effects may still take a place"
     better = bench.fit(A, C)
     monkeypatch.setattr(select, "of_each_effect", lambda space, fit, *more: ({}, better if fit is final else None))
     monkeypatch.setattr(select, "reduced_by", lambda fit, *more: fit)

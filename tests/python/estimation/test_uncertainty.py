@@ -19,7 +19,7 @@ from gaident.estimation.noise_model import WHITE
 from gaident.estimation.objective import Fit, Hypothesis, Objective
 from gaident.estimation.parameterisation import Parameterisation
 from gaident.estimation.prediction import OpenLoop
-from gaident.estimation.regression.regression import long_run
+from gaident.estimation.regression.regression import larger_of, long_run
 from gaident.estimation.uncertainty import covariance_of
 
 Vector = NDArray[np.float64]
@@ -56,10 +56,24 @@ def test_the_long_run_covariance_is_newey_and_wests() -> None:
     np.testing.assert_allclose(long_run(scores), expected, rtol=1e-10)
 
 
+def test_the_larger_of_two_covariances_is_so_for_every_function_of_the_numbers() -> None:
+    """Of two numbers that are nearly opposite the sum is known well: it has a deviation of its own that must not be too small."""
+    rng = np.random.default_rng(5)
+    first = np.array([[100.0, -99.9, 0.0], [-99.9, 100.0, 0.0], [0.0, 0.0, 1e-12]])
+    second = np.outer([1.0, 1.0, 1e-5], [1.0, 1.0, 1e-5]) + 1e-9 * np.diag([1.0, 1.0, 1e-3])
+    both = larger_of(first, second)
+    for c in rng.standard_normal((200, 3)) * [1.0, 1.0, 1e6]:
+        assert c @ both @ c >= (1.0 - 1e-9) * max(c @ first @ c, c @ second @ c)
+    total = np.array([1.0, 1.0, 0.0])
+    assert total @ both @ total == pytest.approx(4.0, rel=0.1) and total @ first @ total == pytest.approx(0.2)
+    np.testing.assert_allclose(larger_of(first, 0.5 * first), first, rtol=1e-9, atol=1e-15)
+    assert not np.any(larger_of(np.zeros((2, 2)), np.eye(2)))
+
+
 def test_of_white_errors_they_are_those_of_least_squares() -> None:
     objective, fit = one_mass(DataSet.of([record(0.1 * np.random.default_rng(1).standard_normal(N))], None))
     ratio = np.sqrt(np.diag(covariance_of(objective, fit))) / stationary(objective, fit)
-    assert np.all((ratio >= 1.0 - 1e-9) & (ratio < 1.2))
+    assert np.all((ratio >= 1.0 - 1e-9) & (ratio < 1.3))
 
 
 def test_errors_that_go_with_the_motion_make_them_larger() -> None:
@@ -76,21 +90,28 @@ def test_errors_that_go_with_the_motion_make_them_larger() -> None:
     assert np.all(plain > 3.0) and np.all(said < 1.6), (plain, said)
 
 
-def test_what_the_steps_of_a_simulation_move_is_in_them(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Cogging, simulated with finer steps: with next to no noise the steps are all that is wrong."""
+@pytest.mark.parametrize(("dt", "substeps"), [(1e-3, 8), (8e-3, 32)])
+def test_what_the_steps_of_a_simulation_move_is_in_them(dt: float, substeps: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Cogging, simulated with 64 steps a line: with next to no noise the steps are all that is wrong.
+
+    At 8 ms a line has as many steps as the library takes.
+    """
     term = LIBRARY["cogging"]
-    data = DataSet.of([record(np.zeros(N))], None)
+    still = ga.Record(dt, velocity=np.zeros(N), torque=TORQUE * 1e-3 / dt)
+    data = DataSet.of([still.with_channels(velocity=ga.simulate(MODEL, still))], None)
+    assert data.substeps(None) == substeps
     parameters = Parameterisation.of(MODEL, scales_of(data), (False,)).extended(term)
-    truth = np.concatenate([parameters.base_vector(MODEL), term.coordinates({"amplitude": 0.02, "order": 18.0, "phase": 0.4})])
-    fine = Hypothesis(parameters, OpenLoop(replace(data, finest=data.finest / 16.0), True))
+    wave = {"amplitude": 0.02 * 1e-3 / dt, "order": 30.0 * 1e-3 / dt, "phase": 0.4}
+    truth = np.concatenate([parameters.base_vector(MODEL), term.coordinates(wave)])
+    fine = Hypothesis(parameters, OpenLoop(replace(data, finer=64 // substeps), True))
     velocity = fine.predictor.velocities(parameters, truth[None, :])[0]
     velocity = velocity + 1e-6 * np.random.default_rng(1).standard_normal(N)
-    data = DataSet.of([ga.Record(DT, velocity=velocity, torque=TORQUE)], None)
+    data = DataSet.of([still.with_channels(velocity=velocity)], None)
     objective = Objective(data, np.ones(N))
     fit = fitted(objective, Hypothesis(parameters, OpenLoop(data, True)), truth, WHITE, 60)
-    wave = slice(2, 4)  # amplitude and phase
-    off = np.abs(fit.x - truth)[wave]
-    assert np.all(off < 2.0 * np.sqrt(np.diag(covariance_of(objective, fit)))[wave])
-    monkeypatch.setattr(uncertainty, "_of_the_steps", lambda objective, fit: 0.0)
+    places = slice(2, 4)  # amplitude and phase
+    off = np.abs(fit.x - truth)[places]
+    assert np.all(off < 2.0 * np.sqrt(np.diag(covariance_of(objective, fit)))[places])
+    monkeypatch.setattr(uncertainty, "_of_the_steps", lambda objective, fit, v, J: 0.0)
     without = Objective(data, np.ones(N))
-    assert np.max(off / np.sqrt(np.diag(covariance_of(without, fit)))[wave]) > 3.0
+    assert np.max(off / np.sqrt(np.diag(covariance_of(without, fit)))[places]) > 3.0

@@ -140,9 +140,12 @@ def deviations(dia: Any, effects: dict[str, dict[str, float]], plant: Plant) -> 
 
     Left out is what the diagnosis calls not determined, and the mechanics of a shaft where the found drive is of one mass.
     An amplitude counts by its size, whose sign is half a turn of the phase.
+    Of an effect at both ends of the shaft each end counts by itself, with its end in the name.
     """
     pairs = [(name, dia.mechanics[name], true, "") for name, true in mechanics_of(plant).items() if name in dia.mechanics]
     hidden = {key.removesuffix(AT_LOAD): values for key, values in effects.items()}
+    if len(hidden) < len(effects):
+        dia, hidden = with_ends(dia), effects
     for finding in counted(dia.findings, tuple(hidden)):
         true = hidden.get(finding.effect, {})
         turned = "amplitude" in finding.parameters and finding.parameters["amplitude"].value < 0.0

@@ -14,10 +14,11 @@ from gaident.diagnosis.library.terms import LIBRARY, of_inverse_dynamics
 from gaident.diagnosis.selection.attribution import friction_shown
 from gaident.diagnosis.selection.mechanisms import is_mechanism, on_no_shaft, one_mass, reduced, resonant, rigid, swings
 from gaident.diagnosis.selection.model_space import Grown
-from gaident.diagnosis.selection.moves import Moves
+from gaident.diagnosis.selection.moves import MISSED, Moves
 from gaident.diagnosis.selection.score_test import ScoreTest
 from gaident.errors import GaidentError, RecordError, SettingsError
 from gaident.estimation import least_squares as ls
+from gaident.estimation.criterion import effective_samples, gained
 from gaident.estimation.dataset import DataSet
 from gaident.estimation.noise_model import WHITE, ShaftNoise
 from gaident.estimation.objective import Fit, Hypothesis, Innovations, Objective, OutputErrors
@@ -198,8 +199,16 @@ class ByOutputErrors:
         """
         if self.axis is None:
             return None
-        fits = [self._fitted(self.axis, values, predictor) for values in _readings(self.axis, self.task.data)]
-        best = min(fits, key=lambda fit: fit.cost)
+        first, *others = _readings(self.axis, self.task.data, MISSED * self.task.scales.torque)
+        best = self._fitted(self.axis, first, predictor)
+        for values in others:
+            if not {*of_inverse_dynamics(values)} - {*of_inverse_dynamics(first)} <= {*self.task.allowed}:
+                continue
+            other = self._fitted(self.axis, values, predictor)
+            more = other.parameters.size - best.parameters.size
+            samples = effective_samples(self.objective.unwhitened_errors(best))
+            if gained(best.cost, other.cost, samples, more) > (POLICY.effect_penalty if more else 0.0):
+                best = other
         return best if best.cost < WORST else None
 
     def _fitted(self, axis: InverseDynamics, values: Mapping[str, float], predictor: Predictor) -> Fit:
@@ -221,17 +230,17 @@ class ByOutputErrors:
         return ls.fit(task.objective, Hypothesis(parameters, predictor), x, WHITE, POLICY.long)
 
 
-def _readings(axis: InverseDynamics, data: DataSet) -> list[dict[str, float]]:
-    """The parameters of the regression, and with dry friction where it has none.
+def _readings(axis: InverseDynamics, data: DataSet, little: float) -> list[dict[str, float]]:
+    """The parameters of the regression, and, where it has no dry friction, with some.
 
     Of an axis that hardly turns back an offset is a load or dry friction; what it did at rest tells, which a free run shows.
-    Elsewhere dry friction starts from a little: behind the regression's filter a fast motion may not show it.
+    Without an offset there is then nothing that could be dry friction.
+    Elsewhere dry friction starts from a little [N m]: behind the regression's filter a fast motion may not show it.
     """
     values = {name: e.value for name, e in axis.parameters.items()}
     if any(name.startswith("coulomb") for name in values):
         return [values]
     if "coulomb" not in axis.terms_not_tried:
-        little = POLICY.check_torque * float(np.std(np.concatenate([r.torque for r in data.records if r.torque is not None])))
         return [values, {**values, "coulomb": little}]
     if "offset" not in values:
         return [values]

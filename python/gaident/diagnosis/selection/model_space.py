@@ -28,7 +28,7 @@ from gaident.estimation.global_search import evolved
 from gaident.estimation.noise_model import WHITE
 from gaident.estimation.objective import LOST, Fit, Hypothesis, Objective, OutputErrors
 from gaident.estimation.prediction import ObserverLoop, OpenLoop, Predictor, torque_noise_draws
-from gaident.estimation.projection import orthonormal_rows
+from gaident.estimation.projection import WORST, orthonormal_rows
 from gaident.estimation.term import Term
 from gaident.policy.table import POLICY
 
@@ -138,6 +138,10 @@ class ModelSpace(NoiseLevel):
         if fuller.parameters.on_a_spring and not (simpler.parameters.on_a_spring or self.beyond_simulation(simpler, fuller)):
             return False
         return self.material(simpler, fuller) and self.beyond_torque_noise(simpler, fuller)
+
+    def rank(self, fit: Fit) -> tuple[bool, bool, float]:
+        """Of ends of a search, the lower the better: a model that diverges is last, before it two masses that are on no shaft."""
+        return not fit.cost < WORST, on_no_shaft(fit), self.score(fit)
 
     @staticmethod
     def leaves_the_shaft(other: Fit, fit: Fit) -> bool:

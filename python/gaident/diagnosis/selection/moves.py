@@ -54,7 +54,7 @@ from gaident.estimation.projection import WORST, orthonormal_rows
 from gaident.estimation.term import Term
 from gaident.models.effect_rows import SHAFT
 
-__all__ = ["Moves"]
+__all__ = ["MISSED", "Moves"]
 
 MISSED = 0.05  # no decision: of the largest torque, a level of friction to start from where the fitted one is lower
 LEAST = 1e-4  # no decision: the same, of a level that was fitted as 0

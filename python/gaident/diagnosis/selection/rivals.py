@@ -31,9 +31,14 @@ class Replacement:
 
 
 def of_each_effect(
-    space: Moves, final: Fit, may_swap: bool, classes: Classes, note: Callable[[str], None]
+    space: Moves,
+    final: Fit,
+    may_swap: bool,
+    classes: Classes,
+    note: Callable[[str], None],
+    kept: Collection[str] = (),
 ) -> tuple[dict[str, tuple[float, list[Replacement]]], Fit | None]:
-    """(rivals of each effect, a better model where there is one and a swap is allowed).
+    """(rivals of each effect, a better model where there is one and a swap is allowed; not for the effects that are `kept`).
 
     Where a record cannot tell a load or a dead band from dry friction, friction has the name: every axis has it.
     """
@@ -44,26 +49,30 @@ def of_each_effect(
         here = classes(term.name)
         gain, rivals = rivals_of(space, final, term.name, here)
         found[term.name] = (gain, rivals)
-        if not rivals or not may_swap:
+        if not rivals or not may_swap or term.name in kept:
             continue
         first = rivals[0]
         contained = term.name in first.fit.parameters.term(first.effect).nested
-        needed = space.penalty if contained else space.margin if first.effect in here else space.policy.swap
+        named = first.effect in here or _has_the_name(term, first.term)
+        needed = space.penalty if contained else space.margin if named else space.policy.swap
         better = first if first.behind < -needed else None
         if better is None:
             # Of effects that these records cannot tell apart, the simplest of a family is preferred to those outside of it, and
             # dry friction to what has no level.
             others = [r for r in rivals if r.term.simplest and r.behind < space.margin]
             better = next((r for r in others if r.effect in here and r.term.family != term.family), None)
-            better = better or next(
-                (r for r in others if r.term.family == term.family and r.term.levels and not term.levels), None
-            )
+            better = better or next((r for r in others if _has_the_name(r.term, term)), None)
         if better is None and (first_of := representative(term)) != term.name:
             # Rounding decides between effects that are the same to every record: the first of them has the name.
             better = next((r for r in rivals if r.effect == first_of and r.behind < space.policy.swap), None)
         if better is not None:
             return found, better.fit
     return found, None
+
+
+def _has_the_name(one: Term, other: Term) -> bool:
+    """Whether an effect has the name before another of its family that the records do not tell from it: dry friction."""
+    return one.simplest and one.family == other.family and bool(one.levels) and not other.levels
 
 
 def rivals_of(space: Moves, final: Fit, effect: str, equivalent: Collection[str] = ()) -> tuple[float, list[Replacement]]:

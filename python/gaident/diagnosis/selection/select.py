@@ -242,8 +242,7 @@ def _explored(task: Task, space: Moves, bases: Sequence[Fit]) -> tuple[Fit, Fit]
             ends.append((base, end))
         if space.quiet(end) and space.small_unwhitened(end) and not on_no_shaft(end):
             break
-    # Two masses that are on no shaft describe some other effect, and come after everything else.
-    return min(ends, key=lambda e: (on_no_shaft(e[1]), space.score(e[1])))
+    return min(ends, key=lambda e: space.rank(e[1]))
 
 
 def _searched(space: Moves, base: Fit) -> Fit:
@@ -286,11 +285,12 @@ def _grown(space: Moves, fit: Fit) -> Fit:
 
 def _improved(space: Moves, other: Fit, best: Fit) -> Fit:
     """Another model, reduced and grown, in the place of the best one where it scores better."""
-    if on_no_shaft(other) == on_no_shaft(best) and space.score(other) > space.score(best) + space.penalty:
+    worse = space.rank(best)[:2] <= space.rank(other)[:2] and space.score(other) > space.score(best) + space.penalty
+    if worse or space.leaves_the_shaft(other, best):
         return best
     other = _grown(space, other)
-    if on_no_shaft(other) != on_no_shaft(best):
-        return min(other, best, key=on_no_shaft)
+    if space.rank(other)[:2] != space.rank(best)[:2]:
+        return min(other, best, key=space.rank)
     return other if space.score(best) - space.score(other) > space.policy.swap else best
 
 
@@ -351,7 +351,7 @@ def _on_all_samples(task: Task, outline: _Found, note: Callable[[str], None]) ->
     ways = [final, *(space.without(final, t.name) for t in final.parameters.terms if t.resonates)]
     if resonance(final) * outline.space.data.dt > 1.0:  # no decision: a time constant 1/w that is shorter than a step
         ways += space.demoted(final)
-    final = min((_beam(space).run([f]) for f in ways), key=space.score)
+    final = min((_beam(space).run([f]) for f in ways), key=space.rank)
     test = specification(space, task, final) if space.whitens else outline.specification
     return _Found(space, base, base, test).of(final)
 
@@ -373,16 +373,17 @@ def _moved(space: Moves, scales: Scales, fit: Fit) -> Fit:
 def _compared(found: _Found, classes: Classes, note: Callable[[str], None]) -> Selection:
     """The model of least cost near by, with the rivals of its effects; a better rival replaces it and is compared in turn."""
     space, final = found.space, found.space.deepened(found.final)
-    for swaps_left in range(POLICY.swaps, -1, -1):
-        rivals, better = of_each_effect(space, final, swaps_left > 0, classes, note)
-        if better is not None:
-            other = reduced_by(space.canonical(better), _reductions(space), space.prefers, space.score)
-            lost = len(other.effects) < len(final.effects) and space.score(other) > space.score(final)  # it is a rival only
-            if lost or space.hidden(better, final):
-                rivals, better = of_each_effect(space, final, False, classes, note)
+    swaps_left, kept = POLICY.swaps, frozenset[str]()
+    while True:
+        rivals, better = of_each_effect(space, final, swaps_left > 0, classes, note, kept)
         if better is None:
             break
-        final = other
+        other = reduced_by(space.canonical(better), _reductions(space), space.prefers, space.score)
+        lost = len(other.effects) < len(final.effects) and space.score(other) > space.score(final)
+        if lost or space.leaves_the_shaft(other, final) or space.hidden(better, final):  # it is a rival only
+            kept |= frozenset(final.effects) - {*better.effects} or frozenset(final.effects)
+            continue
+        final, swaps_left, kept = other, swaps_left - 1, frozenset()
     base = found.base if found.base.parameters.kind == final.parameters.kind else space.bare(final)
     return Selection(space, base, final, rivals, found.specification, found.whitened)
 

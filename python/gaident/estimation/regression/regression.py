@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 
 from gaident.policy.table import POLICY
 
-__all__ = ["covariance", "solve"]
+__all__ = ["covariance", "larger_of", "long_run", "solve"]
 
 Vector = NDArray[np.float64]
 Matrix = NDArray[np.float64]
@@ -53,6 +53,26 @@ def long_run(scores: Matrix) -> Matrix:
     sums[window + n :] = sums[window + n - 1]
     sliding = sums[window:] - sums[:-window]
     return np.asarray(sliding.T @ sliding / window)
+
+
+def larger_of(first: Matrix, second: Matrix) -> Matrix:
+    """The covariance (k, k) that gives no linear function of the numbers a smaller variance than either of two.
+
+        first = L L',   L^+ second L^+' = U diag(r) U',   L U diag(max(r, 1)) U' L'
+
+    Directions in which the first has no variance keep none.
+    """
+    sizes = np.sqrt(np.maximum(np.diag(first), 0.0))
+    sizes = np.where(sizes > 0.0, sizes, 1.0)
+    values, vectors = np.linalg.eigh(first / np.outer(sizes, sizes))
+    known = values > SOLVER_RANK**2 * max(float(values[-1]), 0.0)
+    if not known.any():
+        return first
+    roots = np.sqrt(values[known])
+    L, inverse = sizes[:, None] * vectors[:, known] * roots, (vectors[:, known] / roots).T / sizes
+    ratios, turned = np.linalg.eigh(inverse @ second @ inverse.T)
+    grown = L @ turned * np.sqrt(np.maximum(ratios, 1.0))
+    return np.asarray(grown @ grown.T)
 
 
 def covariance(X: Sequence[Matrix], residuals: Sequence[Vector]) -> Matrix:
