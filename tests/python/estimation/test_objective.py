@@ -149,7 +149,7 @@ def test_the_covariance_of_a_fit_is_worked_out_once(monkeypatch: pytest.MonkeyPa
     fit = fitted(objective, Hypothesis(parameters, OpenLoop(data)), parameters.start(one), WHITE, 5)
     asked: list[object] = []
     at_one_point = uncertainty._at_one_point
-    monkeypatch.setattr(uncertainty, "_at_one_point", lambda o, f: asked.append(f) or at_one_point(o, f))
+    monkeypatch.setattr(uncertainty, "_at_one_point", lambda o, f, *rest: asked.append(f) or at_one_point(o, f, *rest))
     assert estimates_of(objective, fit) == {} and mechanics_of(objective, fit)["inertia"].value == pytest.approx(1e-3, rel=1e-2)
     assert asked == [fit]
 
