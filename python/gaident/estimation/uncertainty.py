@@ -109,10 +109,10 @@ def _jackknife(objective: Objective, fit: Fit) -> Vector:
 def _at_one_point(objective: Objective, fit: Fit, v: Vector, J: Matrix) -> Matrix:
     cov, seen = np.diag(np.where(fit.parameters.steps() > 0.0, np.inf, 0.0)), seen_in(fit, J)
     if len(seen):
-        bread = inverse_of(J[seen] @ J[seen].T)
+        inverse = inverse_of(J[seen] @ J[seen].T)
         scores = np.split((J[seen] * v).T, np.cumsum(objective.lengths)[:-1])
-        robust = bread @ np.sum([long_run(s) for s in scores], axis=0) @ bread
-        cov[np.ix_(seen, seen)] = larger_of(variance_of(objective, fit, v) * bread, robust)
+        robust = inverse @ np.sum([long_run(s) for s in scores], axis=0) @ inverse
+        cov[np.ix_(seen, seen)] = larger_of(variance_of(objective, fit, v) * inverse, robust)
     return cov
 
 

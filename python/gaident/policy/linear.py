@@ -107,7 +107,7 @@ class LinearModels:
     lags_per_root: float = linear(
         1.3,
         "1",
-        "lags of the residuals that the deviations of a regression know, over the root of its rows (Lazarus et al. 2018)",
+        "lags of the errors that deviations of a regression or a fit know, over the root of the rows (Lazarus et al. 2018)",
         REGRESSION,
     )
     noise_from: float = linear(
