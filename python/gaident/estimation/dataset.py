@@ -146,7 +146,7 @@ class DataSet:
 
     def steps_of(self, substeps: int | None) -> int | None:
         """Substeps of a sample of a record made `ready`, from those of a sample."""
-        return max(substeps // 2, 1) if self.differenced and substeps is not None else substeps  # no decision: a formula
+        return substeps // 2 if self.differenced and substeps is not None else substeps  # no decision: a formula
 
     @property
     def differenced(self) -> bool:  # the velocity is the difference of the angle from each line of the log to the next
@@ -168,9 +168,9 @@ class DataSet:
         return all(r.torque is not None for r in (self.read or self.records))
 
     def substeps(self, controller: Controller | None) -> int:
-        """Substeps for every model with effects that are not smooth: of a sample of the log, or of one of the controller's."""
+        """Substeps for every model with effects that are not smooth: of a sample of log or controller, two for its mean."""
         sample = self.dt if controller is None else self.dt / controller.log_every(self.dt)
-        return self.finer * int(2 ** min(max(math.ceil(math.log2(sample / self.finest)), 0), MOST_SUBSTEPS))
+        return self.finer << min(max(math.ceil(math.log2(sample / self.finest)), int(self.differenced)), MOST_SUBSTEPS)
 
     @property
     def loop_only(self) -> bool:
