@@ -18,7 +18,7 @@ from gaident.data.formats.table import Column, LogTable
 from gaident.data.record import CHANNELS, Record
 from gaident.data.signals.arrays import MINIMUM_SAMPLES
 from gaident.data.signals.conditioning import differentiate, low_pass
-from gaident.data.signals.decimation import Decimator, decimated, factor_of
+from gaident.data.signals.decimation import Decimator, decimated, factor_of, over_the_line
 from gaident.data.signals.difference import backward_difference
 from gaident.data.signals.resampling import resampled
 from gaident.data.timeaxis import SLOW_STEP, TimeAxis
@@ -75,6 +75,8 @@ def assemble(table: LogTable, wanted: Wanted, stem: str) -> Record:
             else:
                 values["velocity"] = differentiate(values["position"], dt)
         made = ""
+        if "torque" in values and kind == COMMANDED and wanted.decimate > 1:  # held over each of the log's samples
+            values["torque"] = over_the_line(values["torque"], 0.5 / wanted.decimate)  # no decision: a formula
         if not ELECTRICAL.isdisjoint(named):
             values["torque"], kind, made, note = torque_of_winding(table, wanted, values, dt)
             said += [note] if note else []

@@ -263,7 +263,7 @@ class Record:
 
         The filter has 50 * factor + 1 taps.
         Up to 80 % of the new Nyquist frequency 1/(2 factor dt) all channels pass to within 0.03 %, in phase; from that frequency
-        on they are damped by 72 dB and more.
+        on they are damped by 72 dB and more. A commanded torque, which is held, becomes its mean over each new sample.
         What a digital controller does between the new samples is no longer in the record.
         Identify a decimated record in open loop, or with a continuous controller.
 
@@ -283,7 +283,7 @@ class Record:
             Where the factor is no whole number >= 1, or fewer than 20 samples are left.
         """
         factor = factor_of(factor, "decimate", "({!r})")
-        kept: Mapping[str, Any] = decimated_channels(dict(self.channels()), factor, self.torque_log)
+        kept: Mapping[str, Any] = decimated_channels(dict(self.channels()), factor, self.torque_is, self.torque_log)
         return self.with_channels(dt=self.dt * factor, torque_log=self.torque_log if factor == 1 else SAMPLE, **kept)
 
     def shifted(self, **samples: int) -> Record:

@@ -44,9 +44,17 @@ def held_torque(rec: Record) -> Signal:
 
 
 def torque_at_lines(rec: Record) -> Signal:
-    """The logged torque at each line [N m] (n,), also of a log of means, see `at_its_lines`."""
+    """The torque that acts at each line [N m] (n,), behind a filter that passes no step; of a log of means see `at_its_lines`.
+
+    u(n)                  a sampled torque
+    (u(n-1) + u(n))/2     a commanded torque, which jumps at the line and is held over each sample; nothing before the first
+    """
     assert rec.torque is not None
-    return at_its_lines(rec.torque) if rec.torque_log == MEAN else rec.torque
+    if rec.torque_log == MEAN:
+        return at_its_lines(rec.torque)
+    if rec.torque_is == MEASURED:
+        return rec.torque
+    return 0.5 * (rec.torque + np.append(rec.torque[:1], rec.torque[:-1]))  # no decision: a formula: a mean of two
 
 
 def held_mean(rec: Record) -> Record:

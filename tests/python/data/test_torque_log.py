@@ -10,11 +10,13 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scipy.signal import lfilter
 
 import gaident as ga
 from drive_rig import Noise, Plant, between_lines, disturbances, run_drive, skip_without_library
 from gaident.cli.main import main
 from gaident.control.between import at_lines
+from gaident.data.signals.decimation import decimated
 from gaident.diagnosis.controller.form_regression import law_of
 from gaident.errors import ReadError, RecordError
 from gaident.models.drive_torque import driven_by
@@ -64,13 +66,35 @@ def test_wrong_use_is_named() -> None:
         ga.Record(1e-3, command=np.zeros(50), velocity=np.zeros(50), torque_log="mean")
 
 
-def test_a_decimated_mean_is_no_longer_late() -> None:
-    """The mean since the line before is half a line old: of a sine, the torque comes out in its place."""
+@pytest.mark.parametrize(("kind", "later"), [("measured", 0.0), ("commanded", 5.0)])
+def test_a_decimated_mean_is_no_longer_late(kind: str, later: float) -> None:
+    """The mean since the line before is half a line old: of a sine, a measured torque comes out in its place.
+
+    A commanded one is held from its line on: it comes out as the mean over the new line.
+    """
     n = np.arange(4000)
     slow = 2 * np.pi / 400
-    rec = ga.Record(1e-3, velocity=np.sin(slow * n), torque=np.sin(slow * (n - 0.5)), torque_log="mean").decimate(10)
+    means = np.sin(slow * (n - 0.5))
+    rec = ga.Record(1e-3, velocity=np.sin(slow * n), torque=means, torque_is=kind, torque_log="mean").decimate(10)
     assert rec.torque_log == "sample" and rec.torque is not None
-    assert np.abs(rec.torque - np.sin(slow * n[::10]))[30:-30].max() < 1e-3
+    assert np.abs(rec.torque - np.sin(slow * (n[::10] + later)))[30:-30].max() < 1e-3
+
+
+@pytest.mark.parametrize("factor", [2, 5, 10])
+def test_a_commanded_torque_that_is_decimated_is_held_over_each_new_sample(factor: int) -> None:
+    """An axis under a held torque: left on its lines it would be (M - 1)/2 of the old samples early."""
+    dt, J, B = 5e-4, 2e-3, 0.02
+    u = np.repeat(np.random.default_rng(0).uniform(-1.0, 1.0, 60), 200)
+    stays = np.exp(-B / J * dt)
+    noise = 1e-4 * np.random.default_rng(1).standard_normal(len(u))
+    w = np.append(0.0, lfilter([(1.0 - stays) / B], [1.0, -stays], u)[:-1]) + noise
+    rec = ga.Record(dt, velocity=w, torque=u).decimate(factor)
+    found = ga.identify(rec).model
+    assert 1.0 / found.gain == pytest.approx(J, rel=1e-3) and -found.poles[0].real / found.gain == pytest.approx(B, rel=2e-3)
+    regressed = ga.inverse_dynamics(rec).parameters
+    assert regressed["inertia"].value == pytest.approx(J, rel=2e-3) and regressed["viscous"].value == pytest.approx(B, rel=2e-3)
+    early = ga.inverse_dynamics(ga.Record(dt * factor, velocity=rec.velocity, torque=decimated(u, factor))).parameters
+    assert early["inertia"].value == pytest.approx(J - 0.5 * B * dt * (factor - 1), rel=2e-3)
 
 
 def test_a_file_says_it(tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from gaident.errors import RecordError
 
-__all__ = ["Decimator", "decimated", "factor_of", "low_passed", "reach"]
+__all__ = ["Decimator", "decimated", "factor_of", "low_passed", "over_the_line", "reach"]
 
 _HALF = 25  # no decision: a formula: a low-pass
 """Taps on each side, in samples of the decimated signal."""
@@ -114,6 +114,18 @@ def decimated(x: NDArray[np.float64], factor: int) -> NDArray[np.float64]:
     decimator = Decimator(factor)
     decimator.push(x)
     return decimator.finish()
+
+
+def over_the_line(x: NDArray[np.float64], age: float) -> NDArray[np.float64]:
+    """The means over the lines that follow, of a signal without steps that stands at its lines.
+
+        y(k) = sum_j sinc(j + s) kaiser(j + s; beta = 8) x(k - j),   s = 1/2 - age
+
+    age: by what part of a line the signal acts later than it is logged; 1/(2 M) where M samples that were held became one.
+    """
+    at = np.arange(-_HALF, _HALF + 1) + 0.5 - age  # no decision: a formula: the middle of a line
+    taps = np.sinc(at) * np.i0(_KAISER * np.sqrt(1.0 - (at / (_HALF + 1)) ** 2))
+    return np.asarray(np.convolve(np.pad(x, _HALF, "reflect", reflect_type="odd"), taps / taps.sum(), "valid"))
 
 
 def _reflected(x: NDArray[np.float64], count: int) -> NDArray[np.float64]:
