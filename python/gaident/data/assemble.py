@@ -61,7 +61,8 @@ def assemble(table: LogTable, wanted: Wanted, stem: str) -> Record:
         dt, values = _on_even_axis(table, wanted, named, scales, counters)
     else:
         dt, values = _block_by_block(table, wanted, named, scales, counters)
-    said += [*_slow_clock(table, wanted, named, dt), *dict.fromkeys(column.note for column in named.values() if column.note)]
+    said += [*_slow_clock(table, wanted, named, dt), *_held_long(kind, wanted, named, dt)]
+    said += dict.fromkeys(column.note for column in named.values() if column.note)
     try:
         if "velocity" not in values and "position" not in values:
             values["velocity"] = np.zeros(len(next(iter(values.values()))))
@@ -141,6 +142,18 @@ def _known_by_name(kind: str, wanted: Wanted) -> list[Text]:
         "torque_is='commanded' (--torque-is commanded)."
     )
     return [say(text)]
+
+
+def _held_long(kind: str, wanted: Wanted, named: Mapping[str, Column], dt: float) -> list[Text]:
+    """What to say of a torque that counts as commanded and would be held for longer than any controller does."""
+    said = "torque" not in named or wanted.torque_is is not None or wanted.decimate > 1
+    if said or kind != COMMANDED or not dt > POLICY.longest_hold:
+        return []
+    text = (
+        "The {torque} counts as commanded, held for {:g} ms from each line on, and no drive holds it that long: give "
+        "torque_is='measured' (--torque-is measured) where it was sampled, 'commanded' where it was held."
+    )
+    return [say(text, 1e3 * dt)]
 
 
 def _unnamed_torque(table: LogTable, wanted: Wanted, named: dict[str, Column]) -> list[str]:

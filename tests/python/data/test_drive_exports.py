@@ -211,7 +211,11 @@ def test_long_steps_without_a_unit_are_said_and_asked(
     Path("log.csv").write_text("Zeit;w [rad/s];u [Nm]\n" + rows)
     rec = ga.read("log.csv", columns={"velocity": "w [rad/s]", "torque": "u [Nm]"})
     assert rec.dt == 1.0 and "says no unit, and s was taken: a sample time of 1 s" in rec.notes[0]
-    assert ga.read("log.csv", columns={"velocity": "w", "torque": "u"}, units={"time": "s"}).notes == ()
+    columns = {"velocity": "w", "torque": "u"}
+    (held,) = ga.read("log.csv", columns=columns, units={"time": "s"}).notes
+    assert held.startswith("The torque counts as commanded, held for 1000 ms from each line on, and no drive holds it that long")
+    for kind in ("measured", "commanded"):
+        assert ga.read("log.csv", columns=columns, units={"time": "s"}, torque_is=kind).notes == ()
     assert main(["init", "log.csv", "--json"]) == 0
     assert any("its lines would be 1 s apart" in line for line in json.loads(capsys.readouterr().out)["fill_in"])
     assert main(["identify", "log.csv", "--drive", "drive.toml", "--loop", "open"]) == 2

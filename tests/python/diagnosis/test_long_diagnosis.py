@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -10,12 +11,15 @@ import pytest
 
 import gaident as ga
 from drive_rig import Noise, Plant, rig, skip_without_library
+from gaident.diagnosis.library.terms import LIBRARY
 from gaident.diagnosis.records.folded import folded
+from gaident.diagnosis.records.sizes import scales_of
 from gaident.diagnosis.selection import select
+from gaident.diagnosis.selection.bases import Task
 from gaident.diagnosis.selection.decimated import blocks_of, decimated_record
 from gaident.estimation.dataset import DataSet
 from gaident.estimation.noise_model import ShaftNoise, autoregression
-from gaident.estimation.objective import OutputErrors
+from gaident.estimation.objective import Objective, OutputErrors
 
 DT = 1e-3
 
@@ -193,3 +197,27 @@ def test_a_gap_in_a_long_record_is_found_in_the_loop_under_any_controller() -> N
     assert lag.parameters["time_constant"].value == pytest.approx(0.1e-3, rel=0.03)
     assert dia.mechanics["motor_inertia"].value == pytest.approx(2.8e-4, rel=5e-3)
     assert dia.mechanics["load_inertia"].value == pytest.approx(4.5e-4, rel=5e-3)
+
+
+def test_what_changes_less_than_the_steps_of_the_simulation_is_no_effect() -> None:
+    """Friction behind a lag of half a line, simulated with 64 steps a line; the usual 8 are off by 0.5 us of delay."""
+    still = ga.Record(DT, velocity=np.zeros(4000), torque=np.repeat(np.random.default_rng(3).uniform(-1.0, 1.0, 20), 200))
+    truth = {"coulomb_friction": {"torque": 0.2}, "torque_lag": {"time_constant": 0.5e-3}}
+    drive = ga.OneMass(J=2e-3, D=0.01).model()
+    model = drive
+    for name, values in truth.items():
+        model = model.with_effect(name, **values)
+    noise = 1e-4 * np.random.default_rng(4).standard_normal(4000)
+    data = DataSet.of([still.with_channels(velocity=ga.simulate(model, still, substeps=64) + noise)], None)
+    task = Task(Objective(data, np.ones(4000)), scales_of(data), drive, (), lambda message: None)
+    space, fit = task.space(), task.one_mass()
+    x, hypothesis = fit.parameters.start(drive), fit.hypothesis
+    for name, values in truth.items():
+        x, hypothesis = np.append(x, LIBRARY[name].coordinates(values)), hypothesis.extended(LIBRARY[name])
+    simpler = space.refitted(hypothesis, x)
+    delay = LIBRARY["transport_delay"]
+    for size, counts in ((1e-7, False), (1e-5, True)):
+        hypothesis, x = simpler.hypothesis.extended(delay), np.append(simpler.x, delay.coordinates({"delay": size}))
+        fuller = replace(simpler, hypothesis=hypothesis, x=x, bic=simpler.bic - 1e3)
+        assert space.beyond_steps(simpler, fuller) is counts
+        assert counts or not space.worth(fuller, simpler), "however much better it fits"

@@ -296,7 +296,7 @@ def test_robot_joints(data_dir: object, joint: int) -> None:
     gain, inertia, viscous, coulomb, gravity = JOINTS[joint]
     path = folder(data_dir, "robot_joints") / f"joint_{joint}.csv"  # type: ignore[arg-type]
     columns = {"time": "time", "position": "position", "velocity": "velocity", "torque": "current"}
-    found = ga.inverse_dynamics(ga.read(path, columns, {"torque": gain}, resample=0.01))
+    found = ga.inverse_dynamics(ga.read(path, columns, {"torque": gain}, resample=0.01, torque_is="measured"))
     p = {name: e.value for name, e in found.parameters.items()}
     assert p["inertia"] == pytest.approx(inertia, rel=0.08)
     near_viscous = p.get("viscous", 0.5 * (p.get("viscous_positive", 0.0) + p.get("viscous_negative", 0.0)))

@@ -135,7 +135,7 @@ class ModelSpace(NoiseLevel):
             return False
         if any(set(t.nested) & set(simpler.effects) for t in more) and not self.generalises(simpler, fuller):
             return False
-        if any({*equivalents(t.name)} & {*simpler.effects} for t in more) and not self.beyond_steps(simpler, fuller):
+        if simpler.effects and not self.beyond_steps(simpler, fuller):
             return False
         if fuller.parameters.on_a_spring and not (simpler.parameters.on_a_spring or self.beyond_simulation(simpler, fuller)):
             return False
@@ -188,15 +188,15 @@ class ModelSpace(NoiseLevel):
         return bool(np.sum((refined - with_effects) ** 2) > self.policy.simulation_exact**2 * changed)
 
     def beyond_steps(self, simpler: Fit, fuller: Fit) -> bool:
-        """Whether a second effect of one equivalence class changes the velocity by more than the steps of the simulation do.
+        """Whether what a model has more than another changes the velocity by more than the steps of the simulation do.
 
-        What the simulation of a lag gets wrong looks like another lag.
+        What the simulation of a lag gets wrong looks like another lag, what it gets wrong of friction like more friction.
         An error of first order is twice what half the step changes.
         """
         half = fuller.hypothesis.over(replace(fuller.predictor.data, finer=2))  # no decision: half the step
         pairs = (fuller.hypothesis, fuller.x), (half, fuller.x), (simpler.hypothesis.driven_by(fuller.predictor), simpler.x)
         errors, finer, without = (self.objective.errors(h, x[None, :])[0] for h, x in pairs)
-        return bool(np.sum((without - errors) ** 2) > np.sum((2.0 * (finer - errors)) ** 2))
+        return bool(np.linalg.norm(without - errors) > 2.0 * np.linalg.norm(finer - errors))  # no decision: a formula
 
     def under_predictor_of(self, fit: Fit, other: Fit) -> Fit:
         """The fit under the other's predictor, where that is better: models are compared under the same predictors."""
