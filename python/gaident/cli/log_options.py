@@ -140,7 +140,8 @@ def add_log_options(parser: argparse.ArgumentParser) -> None:
     g.add_argument("--shift", action="append", metavar="CH=N,...", help=shift)
     kinds = "commanded: by the controller; measured: a current times a constant (default: as its column's name says)"
     g.add_argument("--torque-is", choices=TORQUE_KINDS, help=f"what the torque is: {kinds}")
-    lines = "sample: its value at the line (default); mean: over the controller's samples since the line before"
+    lines = "sample: its value at the line (default); mean: over the controller's samples since the line before; "
+    lines += "held, smooth: its value at the line, held until the next, or low-passed and without steps"
     g.add_argument("--torque-log", choices=TORQUE_LOGS, help=f"what a line contains of the torque: {lines}")
     for name, text in CONSTANT_HELP.items():
         g.add_argument(f"--{name.replace('_', '-')}", type=number, metavar="X", help=text)

@@ -24,7 +24,7 @@ from gaident.data.record_checks import at_its_lines
 from gaident.data.signals.arrays import MINIMUM_SAMPLES, channel, positive_number, sample_time
 from gaident.data.signals.decimation import low_passed
 from gaident.data.signals.lags import LagFit, coarse_lags, refine
-from gaident.data.torque_kind import MEAN, SAMPLE
+from gaident.data.torque_kind import MEAN, SAMPLE, SMOOTH
 from gaident.errors import RecordError
 from gaident.estimation.criterion import gained
 from gaident.policy.table import POLICY
@@ -309,7 +309,11 @@ def _result(
     new = {name: PchipInterpolator(axis, low_passed(theirs[name], ratio))(inner[start:stop]) for name in taken}
     channels: Mapping[str, Any] = {name: values[start:stop] for name, values in mine.items()} | new
     kind = other.torque_is if "torque" in taken and isinstance(other, Record) else None
-    record = rec.with_channels(torque_is=kind, torque_log=SAMPLE if "torque" in taken else None, **channels)
+    line = None
+    if "torque" in taken:  # what was low-passed goes on between the lines
+        of_means = isinstance(other, Record) and other.torque_log == MEAN
+        line = SMOOTH if of_means or low_passed(theirs["torque"], ratio) is not theirs["torque"] else SAMPLE
+    record = rec.with_channels(torque_is=kind, torque_log=line, **channels)
     far = max(abs(inner[start] - fit.centre), abs(inner[stop - 1] - fit.centre))
     uncertainty = 2.0 * float(np.hypot(fit.centre_std, far * fit.std[1]))
     return Alignment(record, fit.offset, fit.std[0], fit.rate, fit.std[1], seen, fit.gain, fit.correlation, uncertainty)

@@ -18,11 +18,11 @@ from gaident.data.formats.table import Column, LogTable
 from gaident.data.record import CHANNELS, Record
 from gaident.data.signals.arrays import MINIMUM_SAMPLES
 from gaident.data.signals.conditioning import differentiate, low_pass
-from gaident.data.signals.decimation import Decimator, decimated, factor_of, over_the_line
+from gaident.data.signals.decimation import Decimator, decimated, factor_of
 from gaident.data.signals.difference import backward_difference
 from gaident.data.signals.resampling import resampled
 from gaident.data.timeaxis import SLOW_STEP, TimeAxis
-from gaident.data.torque_kind import COMMANDED, MEAN, MEASURED, kind_of_torque
+from gaident.data.torque_kind import COMMANDED, MEAN, MEASURED, SMOOTH, kind_of_torque
 from gaident.data.wanted import Wanted, si_factor
 from gaident.data.winding_torque import ELECTRICAL, torque_of_winding
 from gaident.errors import ReadError, RecordError
@@ -76,8 +76,6 @@ def assemble(table: LogTable, wanted: Wanted, stem: str) -> Record:
             else:
                 values["velocity"] = differentiate(values["position"], dt)
         made = ""
-        if "torque" in values and kind == COMMANDED and wanted.decimate > 1:  # held over each of the log's samples
-            values["torque"] = over_the_line(values["torque"], 0.5 / wanted.decimate)  # no decision: a formula
         if not ELECTRICAL.isdisjoint(named):
             values["torque"], kind, made, note = torque_of_winding(table, wanted, values, dt)
             said += [note] if note else []
@@ -130,7 +128,7 @@ def _line_of(table: LogTable, wanted: Wanted, values: Mapping[str, NDArray[np.fl
             f"{table.path}: {arg('torque_log', repr(MEAN))} speaks of a logged torque, and this one is worked out of a voltage: "
             "leave torque_log out"
         )
-    return wanted.torque_log
+    return SMOOTH if wanted.decimate > 1 and "torque" in values else wanted.torque_log
 
 
 def _known_by_name(kind: str, wanted: Wanted) -> list[Text]:
@@ -146,14 +144,17 @@ def _known_by_name(kind: str, wanted: Wanted) -> list[Text]:
 
 def _held_long(kind: str, wanted: Wanted, named: Mapping[str, Column], dt: float) -> list[Text]:
     """What to say of a torque that counts as commanded and would be held for longer than any controller does."""
-    said = "torque" not in named or wanted.torque_is is not None or wanted.decimate > 1
-    if said or kind != COMMANDED or not dt > POLICY.longest_hold:
+    column = named.get("torque")
+    if column is None or wanted.torque_is is not None or kind_of_torque((column.key, *column.names)) is not None:
+        return []
+    held = dt / factor_of(wanted.decimate)
+    if kind != COMMANDED or not held > POLICY.longest_hold:
         return []
     text = (
-        "The {torque} counts as commanded, held for {:g} ms from each line on, and no drive holds it that long: give "
+        "The {torque} counts as commanded, held for {:g} ms from each line on, and few drives hold it that long: give "
         "torque_is='measured' (--torque-is measured) where it was sampled, 'commanded' where it was held."
     )
-    return [say(text, 1e3 * dt)]
+    return [say(text, 1e3 * held)]
 
 
 def _unnamed_torque(table: LogTable, wanted: Wanted, named: dict[str, Column]) -> list[str]:

@@ -173,8 +173,8 @@ def read(
         Whether the torque is the controller's command, or a measured current times a constant, with the sensor's noise.
         None: measured where the column's name says so (`Actual current`, `I_q`, `M_ist`, `torque feedback`), else commanded.
         The record's repr shows which it is.
-    torque_log : {"sample", "mean"}
-        What a line contains of it: its value there, or its mean since the line before, see `Record`.
+    torque_log : {"sample", "mean", "held", "smooth"}
+        What a line contains of it: its value there, or its mean since the line before, and how it goes on, see `Record`.
     shift : mapping of str to int, optional
         Channel -> samples by which it is moved against the others, where the log wrote it on another line.
         {"torque": -1} is for a torque that was logged one sample late; see `Record.shifted`.

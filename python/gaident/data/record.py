@@ -33,7 +33,7 @@ from gaident.data.record_checks import (
 )
 from gaident.data.signals.arrays import MINIMUM_SAMPLES, channel
 from gaident.data.signals.decimation import factor_of
-from gaident.data.torque_kind import COMMANDED, SAMPLE
+from gaident.data.torque_kind import COMMANDED, SAMPLE, SMOOTH
 from gaident.errors import RecordError, check_schema
 from gaident.files import write_whole
 from gaident.providers import picture, provided
@@ -78,8 +78,9 @@ class Record:
         What the torque is.
         "commanded": as the controller issued it, before the actuator's limits, dead band, delay and lag.
         "measured": a measured current times a constant, behind the actuator, with the sensor's noise on it.
-    torque_log : {"sample", "mean"}
-        What a line contains of it: its value there, or its mean over the controller's samples up to it since the line before.
+    torque_log : {"sample", "mean", "held", "smooth"}
+        What a line contains: the "mean" over the controller's samples since the line before, or the value there, which is "held"
+        or goes on "smooth", low-passed; "sample": held, but straight if measured and the lines are more than 4 ms apart.
     notes : sequence of str
         What was noticed and done when the log was read; results repeat it, digest and == do not know it.
 
@@ -263,9 +264,8 @@ class Record:
 
         The filter has 50 * factor + 1 taps.
         Up to 80 % of the new Nyquist frequency 1/(2 factor dt) all channels pass to within 0.03 %, in phase; from that frequency
-        on they are damped by 72 dB and more. A commanded torque, which is held, becomes its mean over each new sample.
-        What a digital controller does between the new samples is no longer in the record.
-        Identify a decimated record in open loop, or with a continuous controller.
+        on they are damped by 72 dB and more. A torque then is "smooth", and what a digital controller does there is lost:
+        identify in open loop, or with a continuous controller.
 
         Parameters
         ----------
@@ -283,8 +283,8 @@ class Record:
             Where the factor is no whole number >= 1, or fewer than 20 samples are left.
         """
         factor = factor_of(factor, "decimate", "({!r})")
-        kept: Mapping[str, Any] = decimated_channels(dict(self.channels()), factor, self.torque_is, self.torque_log)
-        return self.with_channels(dt=self.dt * factor, torque_log=self.torque_log if factor == 1 else SAMPLE, **kept)
+        kept: Mapping[str, Any] = decimated_channels(dict(self.channels()), factor, self.torque_log)
+        return self.with_channels(dt=self.dt * factor, torque_log=SMOOTH if factor > 1 and "torque" in kept else None, **kept)
 
     def shifted(self, **samples: int) -> Record:
         """Return the record with channels moved against the others, for a log that wrote them on another line.

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from gaident.axis import Text
 from gaident.checks import one_of
 from gaident.data.signals.arrays import MINIMUM_SAMPLES, channel, sample_time
-from gaident.data.signals.decimation import decimated, over_the_line
+from gaident.data.signals.decimation import decimated
 from gaident.data.signals.wraps import continued, overflow, wrapped_words
 from gaident.data.torque_kind import COMMANDED, MEAN, SAMPLE, TORQUE_KINDS, TORQUE_LOGS
 from gaident.errors import RecordError
@@ -206,18 +206,14 @@ def still_driven(channels: Mapping[str, object], changed: Mapping[str, object]) 
 
 
 def decimated_channels(
-    channels: Mapping[str, NDArray[np.float64]], factor: int, torque_is: str, torque_log: str
+    channels: Mapping[str, NDArray[np.float64]], factor: int, torque_log: str
 ) -> dict[str, NDArray[np.float64]]:
     """Every `factor`-th sample behind a low-pass, see `Record.decimate`. Raises RecordError where too few are left."""
     count = -(-len(channels["velocity"]) // factor)
     if count < MINIMUM_SAMPLES:
         raise RecordError(f"decimate({factor}) leaves {count} samples, but at least {MINIMUM_SAMPLES} are needed")
     late = {"torque": at_its_lines(channels["torque"])} if torque_log == MEAN and factor > 1 else {}
-    fewer = {key: decimated(values, factor) for key, values in (dict(channels) | late).items()}
-    if "torque" in fewer and torque_is == COMMANDED and factor > 1:
-        # no decision: a formula: what is held acts half a sample later, what was put on its lines at once
-        fewer["torque"] = over_the_line(fewer["torque"], 0.0 if torque_log == MEAN else 0.5 / factor)
-    return fewer
+    return {key: decimated(values, factor) for key, values in (dict(channels) | late).items()}
 
 
 def at_its_lines(means: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -8,14 +8,18 @@ from itertools import pairwise
 
 from gaident.data.column_words import COMMAND_WORDS, FOREIGN_WORDS, MEASURED_WORDS, QUANTITY_WORDS, words_of
 
-__all__ = ["COMMANDED", "MEAN", "MEASURED", "SAMPLE", "TORQUE_KINDS", "TORQUE_LOGS", "kind_of_torque", "kind_of_column"]
+__all__ = [
+    *("COMMANDED", "HELD", "MEAN", "MEASURED", "SAMPLE", "SMOOTH", "TORQUE_KINDS", "TORQUE_LOGS"),
+    *("kind_of_torque", "kind_of_column"),
+]
 
 COMMANDED, MEASURED = "commanded", "measured"
 TORQUE_KINDS = (COMMANDED, MEASURED)
 """What a logged torque may be: the controller's command, or a measured current times a constant."""
-SAMPLE, MEAN = "sample", "mean"
-TORQUE_LOGS = (SAMPLE, MEAN)
-"""What a line of the log contains of it: its value there, or its mean since the line before."""
+SAMPLE, MEAN, HELD, SMOOTH = "sample", "mean", "held", "smooth"
+TORQUE_LOGS = (SAMPLE, MEAN, HELD, SMOOTH)
+"""What a line of the log contains of it: its value there, its mean since the line before, or its value there and how it goes on:
+held until the next line, or smoothly, without steps."""
 
 _BEHIND_ACTUATOR = (MEASURED_WORDS - {"motor", "servo", "real", "est", "estimate", "estimated"}) | {"sensor"}
 _QUADRATURE = frozenset({"iq", "isq"})  # a drive's name for the torque-forming current that its transducers see

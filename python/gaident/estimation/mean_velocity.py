@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from gaident.control.controller import Controller
 from gaident.control.differencing import older
 from gaident.data.record import Record
+from gaident.data.torque_kind import HELD, MEAN
 from gaident.models.drive_torque import HALF, as_late
 from gaident.models.held_torque import kind_of_held, sampled_between
 from gaident.models.simulate import Run, run, simulate
@@ -43,7 +44,8 @@ def with_middles(rec: Record) -> Record:
 
     channels: dict[str, Any] = {name: between(name, x) for name, x in rec.channels()}
     half = 0.5 * rec.dt  # no decision: a formula: half the sample
-    return rec.with_channels(dt=half, torque_is=kind_of_held(rec, half), **channels)
+    line = HELD if rec.torque is not None and rec.torque_log != MEAN else None
+    return rec.with_channels(dt=half, torque_is=kind_of_held(rec, half), torque_log=line, **channels)
 
 
 def means(W: Matrix) -> Matrix:

@@ -66,7 +66,8 @@ def age_part(objective: Objective, fit: Fit) -> Matrix:
 
 def _covariance(objective: Objective, fit: Fit) -> Matrix:
     v, J = objective.linearised(fit.hypothesis, fit.x, fit.noise)
-    return _of_the_errors(objective, fit, v, J) + _of_the_steps(objective, fit, v, J) + controller_part(objective, fit)
+    found = _of_the_errors(objective, fit, v, J) + _of_the_steps(objective, fit, v, J) + controller_part(objective, fit)
+    return found + _of_the_angle(objective, fit)
 
 
 def _of_the_errors(objective: Objective, fit: Fit, v: Vector, J: Matrix) -> Matrix:
@@ -81,18 +82,48 @@ def _of_the_errors(objective: Objective, fit: Fit, v: Vector, J: Matrix) -> Matr
 
 
 def _of_the_steps(objective: Objective, fit: Fit, v: Vector, J: Matrix) -> Matrix:
-    """The square of what the steps of the simulation move in x, to first order; 0 beside impacts, whose times they change."""
+    """The square of what the steps of the simulation move in x: to first order; beside impacts, whose times change, by a fit."""
     part, seen = np.zeros((len(fit.x), len(fit.x))), seen_in(fit, J)
-    if not fit.effects or fit.impacts or not len(seen):
+    if not fit.effects or not len(seen):
         return part
     finer = fit.hypothesis.over(replace(fit.predictor.data, finer=2))  # no decision: half a step
     error = objective.errors(finer, fit.x[None, :])
     if np.abs(error).max() < LOST:
-        changed = objective.whitened(error, fit.noise, objective.inertias(fit.hypothesis, fit.x[None, :]))[0] - v
+        if fit.impacts:
+            moved = fitted(objective, finer, fit.x, fit.noise, POLICY.short).x[seen] - fit.x[seen]
+        else:
+            whitened = objective.whitened(error, fit.noise, objective.inertias(fit.hypothesis, fit.x[None, :]))
+            moved = answers(J[seen], whitened - v)[:, 0]
         # An error of first order in the step is twice what half the step changes; one of second order, 4/3 of it.
-        move = 2.0 * answers(J[seen], changed)
-        part[np.ix_(seen, seen)] = np.outer(move, move)
+        part[np.ix_(seen, seen)] = 4.0 * np.outer(moved, moved)  # no decision: a formula: twice, squared
     return part
+
+
+def _of_the_angle(objective: Objective, fit: Fit) -> Matrix:
+    """What the noise of the velocity does to an angle that is its integral, and so to the phases; 0 where the angle is another.
+
+        var of the angle's mean over n samples = (s dt)^2 n/3,   phase: moves by the order times it
+
+    s: standard deviation of white noise on the velocity. The difference of an encoder's angle does not walk away from it.
+    """
+    part, data = np.zeros((len(fit.x), len(fit.x))), fit.predictor.data
+    turning = [t for t in fit.parameters.terms if t.harmonic and "phase" in [p.name for p in row_of(t.name).parameters]]
+    if not turning or data.angle_logged or data.differenced or fit.predictor.own_angle:
+        return part
+    move = np.zeros(len(fit.x))
+    for term in turning:
+        slot = fit.parameters.slot(term.name)
+        names = [p.name for p in row_of(term.name).parameters]
+        values = dict(zip(names, term.natural(fit.x[slot][None, :])[0], strict=True))
+        h = 1e-6  # no decision: the step of a difference
+        turned = term.coordinates(values | {"phase": values["phase"] + h}) - term.coordinates(values)
+        move[slot] = values.get("order", 1.0) * np.asarray(turned) / h
+    lengths = np.array(objective.lengths, dtype=np.float64)
+    noise = data.noise_of(objective.error(fit)) * data.dt
+    variance = (
+        noise**2 * float(np.sum((lengths / lengths.sum()) ** 2 * lengths)) / 3.0
+    )  # no decision: a formula: of a random walk
+    return variance * np.outer(move, move)
 
 
 def _jackknife(objective: Objective, fit: Fit) -> Vector:

@@ -14,7 +14,7 @@ from gaident.control.pi import PI
 from gaident.control.pi_torque import pi_block
 from gaident.data.record import Record
 from gaident.data.signals.difference import difference_at_clock, is_difference_at_clock, is_difference_of_lines
-from gaident.data.torque_kind import MEAN, SAMPLE
+from gaident.data.torque_kind import HELD, MEAN, SAMPLE
 from gaident.errors import RecordError
 from gaident.models.held_torque import held_mean
 from gaident.models.made_torque import late, made_at_its_clock, stored_torque
@@ -59,7 +59,7 @@ def driven_by(rec: Record, controller: Controller, made: Vector | None = None) -
     if every > 1:
         at_clock = _at_its_clock(rec, torque, controller, stored, made).reshape(len(rec), every)
         torque = _mean_ahead(torque, at_clock) if rec.torque_log == MEAN else at_clock.mean(axis=1)
-    return rec.with_channels(torque=late(torque, controller.delay / rec.dt, before), torque_log=SAMPLE)
+    return rec.with_channels(torque=late(torque, controller.delay / rec.dt, before), torque_log=HELD)
 
 
 def on_lines(rec: Record, controller: Controller | None) -> Record:
@@ -82,7 +82,7 @@ def straight_driven(rec: Record, controller: Controller) -> Record:
     before = torque_before(rec)
     straight = _straight(rec, rec.torque, every).reshape(len(rec), every)
     mean = _mean_ahead(rec.torque, straight) if rec.torque_log == MEAN else straight.mean(axis=1)
-    return rec.with_channels(torque=late(mean, controller.delay / rec.dt, before), torque_log=SAMPLE)
+    return rec.with_channels(torque=late(mean, controller.delay / rec.dt, before), torque_log=HELD)
 
 
 def _mean_ahead(logged: Vector, at_clock: Matrix) -> Vector:

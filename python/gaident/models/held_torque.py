@@ -10,17 +10,24 @@ from numpy.typing import NDArray
 
 from gaident.data.record import Record
 from gaident.data.record_checks import at_its_lines
-from gaident.data.torque_kind import COMMANDED, MEAN, MEASURED, SAMPLE
+from gaident.data.signals.decimation import means_ahead
+from gaident.data.torque_kind import COMMANDED, HELD, MEAN, MEASURED, SAMPLE, SMOOTH
 from gaident.policy.table import POLICY
 
-__all__ = ["held_mean", "held_torque", "kind_of_held", "sampled_between", "torque_at_lines"]
+__all__ = ["held_from_lines", "held_mean", "held_torque", "kind_of_held", "sampled_between", "torque_at_lines"]
 
 Signal = NDArray[np.float64]
 
 
 def sampled_between(rec: Record) -> bool:
     """Whether the torque is a sample, at each line, of one that changes between the lines: no drive holds it that long."""
-    return rec.torque_is == MEASURED and rec.torque_log != MEAN and rec.dt > POLICY.longest_hold
+    slow = rec.torque_is == MEASURED and rec.dt > POLICY.longest_hold
+    return rec.torque_log == SMOOTH or (rec.torque_log == SAMPLE and slow)
+
+
+def held_from_lines(rec: Record) -> bool:
+    """Whether the torque jumps at each line and is held until the next: a commanded one, unless the record says another thing."""
+    return rec.torque_log == HELD or (rec.torque_log == SAMPLE and rec.torque_is == COMMANDED)
 
 
 def kind_of_held(rec: Record, dt: float) -> str:
@@ -33,6 +40,7 @@ def held_torque(rec: Record) -> Signal:
 
         u_h(n) = (u(n) + u(n+1))/2        a torque that goes straight from line to line; the last line is held
         u_h(n) = u(n+1)                   a log of means since the line before
+        u_h(n) = the mean over the line of what a band-limited signal is there (`means_ahead`)     a smooth torque
 
     Held from its line on, a sampled torque would be half a line late.
     """
@@ -40,6 +48,8 @@ def held_torque(rec: Record) -> Signal:
     u = np.ascontiguousarray(rec.torque, dtype=np.float64)
     if rec.torque_log == MEAN:
         return np.append(u[1:], u[-1])
+    if rec.torque_log == SMOOTH:
+        return means_ahead(u)
     return np.append(0.5 * (u[1:] + u[:-1]), u[-1]) if sampled_between(rec) else u  # no decision: a formula: a mean of two
 
 
@@ -47,12 +57,12 @@ def torque_at_lines(rec: Record) -> Signal:
     """The torque that acts at each line [N m] (n,), behind a filter that passes no step; of a log of means see `at_its_lines`.
 
     u(n)                  a sampled torque
-    (u(n-1) + u(n))/2     a commanded torque, which jumps at the line and is held over each sample; nothing before the first
+    (u(n-1) + u(n))/2     a commanded torque, or another that is held; nothing before the first
     """
     assert rec.torque is not None
     if rec.torque_log == MEAN:
         return at_its_lines(rec.torque)
-    if rec.torque_is == MEASURED:
+    if not held_from_lines(rec):
         return rec.torque
     return 0.5 * (rec.torque + np.append(rec.torque[:1], rec.torque[:-1]))  # no decision: a formula: a mean of two
 
@@ -61,4 +71,4 @@ def held_mean(rec: Record) -> Record:
     """The record with the torque that is held over each line in place of a mean since the line before."""
     if rec.torque is None or rec.torque_log != MEAN:
         return rec
-    return rec.with_channels(torque=held_torque(rec), torque_is=kind_of_held(rec, rec.dt), torque_log=SAMPLE)
+    return rec.with_channels(torque=held_torque(rec), torque_is=kind_of_held(rec, rec.dt), torque_log=HELD)

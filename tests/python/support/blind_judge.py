@@ -141,6 +141,7 @@ def deviations(dia: Any, effects: dict[str, dict[str, float]], plant: Plant) -> 
     Left out is what the diagnosis calls not determined, and the mechanics of a shaft where the found drive is of one mass.
     An amplitude counts by its size, whose sign is half a turn of the phase.
     Of an effect at both ends of the shaft each end counts by itself, with its end in the name.
+    What is found to a millionth of its value is right: rounding is no deviation.
     """
     pairs = [(name, dia.mechanics[name], true, "") for name, true in mechanics_of(plant).items() if name in dia.mechanics]
     hidden = {key.removesuffix(AT_LOAD): values for key, values in effects.items()}
@@ -159,5 +160,5 @@ def deviations(dia: Any, effects: dict[str, dict[str, float]], plant: Plant) -> 
             error = -estimate.value - true
         if kind.rstrip("!") in ANGLES:
             error = math.remainder(error + math.pi * kind.endswith("!"), 2.0 * math.pi)
-        found[name] = error / estimate.std
+        found[name] = error / max(estimate.std, 1e-6 * abs(true))
     return found

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from gaident.errors import RecordError
 
-__all__ = ["Decimator", "decimated", "factor_of", "low_passed", "over_the_line", "reach"]
+__all__ = ["Decimator", "decimated", "factor_of", "low_passed", "means_ahead", "reach"]
 
 _HALF = 25  # no decision: a formula: a low-pass
 """Taps on each side, in samples of the decimated signal."""
@@ -116,16 +116,21 @@ def decimated(x: NDArray[np.float64], factor: int) -> NDArray[np.float64]:
     return decimator.finish()
 
 
-def over_the_line(x: NDArray[np.float64], age: float) -> NDArray[np.float64]:
-    """The means over the lines that follow, of a signal without steps that stands at its lines.
+def means_ahead(x: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Of a low-passed signal at its lines (n,), the means over the lines that follow.
 
-        y(k) = sum_j sinc(j + s) kaiser(j + s; beta = 8) x(k - j),   s = 1/2 - age
-
-    age: by what part of a line the signal acts later than it is logged; 1/(2 M) where M samples that were held became one.
+    y(k) = sum_j h(j) x(k - j),   h(j) = mean over 0 < s < 1 of sinc(j + s) kaiser(j + s; beta = 8)
     """
-    at = np.arange(-_HALF, _HALF + 1) + 0.5 - age  # no decision: a formula: the middle of a line
-    taps = np.sinc(at) * np.i0(_KAISER * np.sqrt(1.0 - (at / (_HALF + 1)) ** 2))
-    return np.asarray(np.convolve(np.pad(x, _HALF, "reflect", reflect_type="odd"), taps / taps.sum(), "valid"))
+    return np.asarray(np.convolve(np.pad(x, (_HALF, _HALF), "reflect", reflect_type="odd"), _ahead(), "valid"))
+
+
+@lru_cache(maxsize=1)
+def _ahead() -> NDArray[np.float64]:
+    """h(-half..half), normalised."""
+    middles = (np.arange(64) + 0.5) / 64  # no decision: a grid: of an integral
+    at = np.arange(-_HALF, _HALF + 1)[:, None] + middles
+    taps = np.mean(np.sinc(at) * np.i0(_KAISER * np.sqrt(np.maximum(1.0 - (at / (_HALF + 1)) ** 2, 0.0))), axis=1)
+    return np.asarray(taps / taps.sum())
 
 
 def _reflected(x: NDArray[np.float64], count: int) -> NDArray[np.float64]:

@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gaident.data.record import Record
+from gaident.data.torque_kind import HELD
 from gaident.estimation.dataset import FINEST, DataSet
 from gaident.estimation.noise_model import WHITE
 from gaident.estimation.objective import Fit, Hypothesis, Objective
@@ -71,8 +72,8 @@ def decimated_record(rec: Record, blocks: int) -> Record:
     """The record on the coarse grid, its torque as it is held there; what is left over at its end is not used."""
     k, count = blocks, len(rec) // blocks
     torque = held_torque(rec)[: count * k].reshape(count, k).mean(axis=1)
-    kept = {name: x[: count * k : k] for name, x in rec.channels()}
-    return rec.with_channels(dt=rec.dt * k, torque_is=kind_of_held(rec, rec.dt * k), **kept | {"torque": torque})
+    kept = {name: x[: count * k : k] for name, x in rec.channels()} | {"torque": torque}
+    return rec.with_channels(dt=rec.dt * k, torque_is=kind_of_held(rec, rec.dt * k), torque_log=HELD, **kept)
 
 
 def moved(data: DataSet, scales: Scales, fit: Fit) -> Fit:

@@ -135,7 +135,8 @@ class ModelSpace(NoiseLevel):
             return False
         if any(set(t.nested) & set(simpler.effects) for t in more) and not self.generalises(simpler, fuller):
             return False
-        if simpler.effects and not self.beyond_steps(simpler, fuller):
+        alike = any({*equivalents(t.name)} & {*simpler.effects} for t in more)
+        if (alike or (simpler.effects and not fuller.impacts)) and not self.beyond_steps(simpler, fuller):
             return False
         if fuller.parameters.on_a_spring and not (simpler.parameters.on_a_spring or self.beyond_simulation(simpler, fuller)):
             return False
@@ -192,10 +193,12 @@ class ModelSpace(NoiseLevel):
 
         What the simulation of a lag gets wrong looks like another lag, what it gets wrong of friction like more friction.
         An error of first order is twice what half the step changes.
+        Beside impacts, whose times steps move, this is asked of another effect of the same class only.
         """
         half = fuller.hypothesis.over(replace(fuller.predictor.data, finer=2))  # no decision: half the step
-        pairs = (fuller.hypothesis, fuller.x), (half, fuller.x), (simpler.hypothesis.driven_by(fuller.predictor), simpler.x)
-        errors, finer, without = (self.objective.errors(h, x[None, :])[0] for h, x in pairs)
+        pairs = (half, fuller.x), (simpler.hypothesis.driven_by(fuller.predictor), simpler.x)
+        finer, without = (self.objective.errors(h, x[None, :])[0] for h, x in pairs)
+        errors = self.objective.error(fuller)
         return bool(np.linalg.norm(without - errors) > 2.0 * np.linalg.norm(finer - errors))  # no decision: a formula
 
     def under_predictor_of(self, fit: Fit, other: Fit) -> Fit:

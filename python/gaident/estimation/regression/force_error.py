@@ -32,7 +32,7 @@ from gaident.data.record import Record
 from gaident.data.torque_kind import MEAN, MEASURED
 from gaident.errors import ModelError, RecordError, SettingsError
 from gaident.estimation.regression.motion import ORDER, Motion, cutoff_of, low_passed, motion_of, noise_share, torque_noise
-from gaident.models.held_torque import held_torque
+from gaident.models.held_torque import held_from_lines, held_torque
 from gaident.models.model import Model
 from gaident.models.simulate import run, simulate
 from gaident.policy.table import POLICY
@@ -279,7 +279,7 @@ def _led(model: Model, rec: Record, motion: Motion, cutoff_hz: float) -> Vector:
             led = run(mechanism, Record(dt, command=command, velocity=command, position=position), loop, state)
             command = command + np.where(np.isfinite(led.velocity), wanted - led.velocity, 0.0)
     held = led.torque.reshape(n, fine)
-    sampled = rec.torque_is == MEASURED and rec.torque_log != MEAN
+    sampled = rec.torque_log != MEAN and not held_from_lines(rec)
     return np.asarray(held[:, 0] if sampled else held.mean(axis=1))
 
 
