@@ -19,7 +19,9 @@ from gaident.diagnosis.selection.bases import Task
 from gaident.diagnosis.selection.decimated import blocks_of, decimated_record
 from gaident.estimation.dataset import DataSet
 from gaident.estimation.noise_model import ShaftNoise, autoregression
-from gaident.estimation.objective import Objective, OutputErrors
+from gaident.estimation.objective import Hypothesis, Objective, OutputErrors
+from gaident.estimation.parameterisation import Parameterisation
+from gaident.estimation.prediction import OpenLoop
 
 DT = 1e-3
 
@@ -221,3 +223,30 @@ def test_what_changes_less_than_the_steps_of_the_simulation_is_no_effect() -> No
         fuller = replace(simpler, hypothesis=hypothesis, x=x, bic=simpler.bic - 1e3)
         assert space.beyond_steps(simpler, fuller) is counts
         assert counts or not space.worth(fuller, simpler), "however much better it fits"
+
+
+def test_beside_impacts_steps_speak_against_another_effect_of_a_class_only() -> None:
+    """A gap of 0.02 rad: steps move the times of the impacts by more than a friction of 0.002 N m does, which is there."""
+    drive = ga.TwoMass(JM=3e-4, DM=2e-3, JL=5e-4, DL=2e-3, KG=200.0, DG=0.01).model()
+    torque = np.repeat(np.random.default_rng(2).uniform(-1.0, 1.0, 20), 200)
+    still = ga.Record(DT, velocity=np.zeros(4000), torque=torque)
+    model = drive.with_effect("backlash", gap=0.02).with_effect("coulomb_friction", torque=0.002)
+    noise = 0.01 * np.random.default_rng(4).standard_normal(4000)
+    data = DataSet.of([still.with_channels(velocity=ga.simulate(model, still, substeps=64) + noise)], None)
+    space = Task(Objective(data, np.ones(4000), OutputErrors(4000.0)), scales_of(data), drive, (), lambda message: None).space()
+    parameters = Parameterisation.of(drive, scales_of(data), data.moving)
+    hypothesis = Hypothesis(parameters, OpenLoop(data)).extended(LIBRARY["backlash"])
+    simpler = space.refitted(hypothesis, np.append(parameters.base_vector(drive), LIBRARY["backlash"].coordinates({"gap": 0.02})))
+    friction = LIBRARY["coulomb_friction"]
+    fuller = space.refitted(simpler.hypothesis.extended(friction), np.append(simpler.x, friction.coordinates({"torque": 0.002})))
+    assert not space.beyond_steps(simpler, fuller) and space.worth(fuller, simpler)
+
+
+def test_half_a_step_is_one_where_the_velocity_is_a_mean_too() -> None:
+    """A mean over a sample takes two steps at least, so that twice as many are four."""
+    data = DataSet.of([axis(2000)], None)
+    means = replace(data, age=0.5)
+    assert data.steps_of(data.substeps(None)) == 8 and replace(data, finer=2).substeps(None) == 16
+    fast = replace(means, finest=1.0)
+    assert [replace(fast, finer=k).substeps(None) for k in (1, 2)] == [2, 4]
+    assert [replace(fast, finer=k).steps_of(replace(fast, finer=k).substeps(None)) for k in (1, 2)] == [1, 2]
