@@ -264,8 +264,8 @@ class Record:
 
         The filter has 50 * factor + 1 taps.
         Up to 80 % of the new Nyquist frequency 1/(2 factor dt) all channels pass to within 0.03 %, in phase; from that frequency
-        on they are damped by 72 dB and more. A torque then is "smooth", and what a digital controller does there is lost:
-        identify in open loop, or with a continuous controller.
+        on they are damped by 72 dB and more. A torque then is "smooth".
+        What a digital controller does in between is lost: identify in open loop, or with a continuous controller.
 
         Parameters
         ----------
