@@ -20,7 +20,7 @@ Signal = NDArray[np.float64]
 
 
 def sampled_between(rec: Record) -> bool:
-    """Whether the torque is a sample, at each line, of one that changes between the lines: no drive holds it that long."""
+    """Whether the torque is a sample, at each line, of one that changes between the lines: low-passed, or not held that long."""
     slow = rec.torque_is == MEASURED and rec.dt > POLICY.longest_hold
     return rec.torque_log == SMOOTH or (rec.torque_log == SAMPLE and slow)
 

@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 
 from gaident.data.record import Record
 from gaident.data.signals.decimation import low_passed, reach
-from gaident.data.torque_kind import SMOOTH
+from gaident.data.torque_kind import HELD
 from gaident.errors import GaidentError
 from gaident.estimation.criterion import effective_samples
 from gaident.estimation.regression.inverse_dynamics import inverse_dynamics
@@ -62,11 +62,10 @@ def torque_lag(rec: Record, cutoff_hz: float | None = None, axis: str = "rotary"
     assert rec.torque is not None
     cutoff = min(cutoff_of(rec, ORDER), np.inf if cutoff_hz is None else cutoff_hz)
     factor = decimation_of(None, cutoff, rec.dt)
-    held = 0.5 * (rec.torque + np.concatenate([rec.torque[:1], rec.torque[:-1]]))
     both = bool(np.any(rec.velocity > 0.0) and np.any(rec.velocity < 0.0))
     terms: tuple[str, ...] = ("inertia", "viscous", "coulomb", "offset") if both else ("inertia", "viscous", "offset")
     terms += _of_angle(rec, cutoff, axis)
-    motion = motion_of(rec.with_channels(torque=held, torque_log=SMOOTH), cutoff, ORDER)
+    motion = motion_of(rec.with_channels(torque_log=HELD), cutoff, ORDER)
     torque = motion.torque
     assert torque is not None
     kept = ~motion.still
