@@ -68,11 +68,6 @@ class Predictor(Protocol):
         """Whether effects of the angle turn with the simulated shaft."""
         ...
 
-    @property
-    def difference(self) -> float:
-        """Step of a forward difference, as a part of a change that matters: with stops and impacts the error is not smooth."""
-        ...
-
     def velocities(self, parameters: Parameterisation, X: Matrix) -> Matrix:
         """Simulated velocities of rows of x, (n, samples)."""
         ...
@@ -92,7 +87,6 @@ class OpenLoop:
     data: DataSet
     own_angle: bool = False
     closed = False
-    difference = 1e-3
 
     def velocities(self, parameters: Parameterisation, X: Matrix) -> Matrix:
         """See `Predictor`."""
@@ -135,7 +129,6 @@ class ClosedLoop:
     data: DataSet
     own_angle: bool = False
     closed = True
-    difference = 3e-3
 
     def velocities(self, parameters: Parameterisation, X: Matrix) -> Matrix:
         """See `Predictor`."""
@@ -184,7 +177,6 @@ class ObserverLoop:
     data: DataSet
     own_angle: bool = False
     closed = True
-    difference = 3e-3
 
     def velocities(self, parameters: Parameterisation, X: Matrix) -> Matrix:
         """See `Predictor`."""

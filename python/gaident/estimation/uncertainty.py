@@ -29,7 +29,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gaident.errors import ModelError
-from gaident.estimation.found_numbers import answers, of_ages, of_numbers, seen_in, variance_of
+from gaident.estimation.found_numbers import of_ages, of_numbers, seen_in, variance_of
 from gaident.estimation.least_squares import fit as fitted
 from gaident.estimation.objective import LOST, Fit, Objective
 from gaident.estimation.projection import inverse_of
@@ -66,7 +66,7 @@ def age_part(objective: Objective, fit: Fit) -> Matrix:
 
 def _covariance(objective: Objective, fit: Fit) -> Matrix:
     v, J = objective.linearised(fit.hypothesis, fit.x, fit.noise)
-    found = _of_the_errors(objective, fit, v, J) + _of_the_steps(objective, fit, v, J) + controller_part(objective, fit)
+    found = _of_the_errors(objective, fit, v, J) + _of_the_steps(objective, fit, J) + controller_part(objective, fit)
     return found + _of_the_angle(objective, fit)
 
 
@@ -81,19 +81,14 @@ def _of_the_errors(objective: Objective, fit: Fit, v: Vector, J: Matrix) -> Matr
     return cov * np.outer(larger, larger)
 
 
-def _of_the_steps(objective: Objective, fit: Fit, v: Vector, J: Matrix) -> Matrix:
-    """The square of what the steps of the simulation move in x: to first order; beside impacts, whose times change, by a fit."""
+def _of_the_steps(objective: Objective, fit: Fit, J: Matrix) -> Matrix:
+    """The square of what the steps of the simulation move in x, by a fit under half the step."""
     part, seen = np.zeros((len(fit.x), len(fit.x))), seen_in(fit, J)
     if not fit.effects or not len(seen):
         return part
     finer = fit.hypothesis.over(replace(fit.predictor.data, finer=2))  # no decision: half a step
-    error = objective.errors(finer, fit.x[None, :])
-    if np.abs(error).max() < LOST:
-        if fit.impacts:
-            moved = fitted(objective, finer, fit.x, fit.noise, POLICY.short).x[seen] - fit.x[seen]
-        else:
-            whitened = objective.whitened(error, fit.noise, objective.inertias(fit.hypothesis, fit.x[None, :]))
-            moved = answers(J[seen], whitened - v)[:, 0]
+    if np.abs(objective.errors(finer, fit.x[None, :])).max() < LOST:
+        moved = fitted(objective, finer, fit.x, fit.noise, POLICY.short).x[seen] - fit.x[seen]
         # An error of first order in the step is twice what half the step changes; one of second order, 4/3 of it.
         part[np.ix_(seen, seen)] = 4.0 * np.outer(moved, moved)  # no decision: a formula: twice, squared
     return part

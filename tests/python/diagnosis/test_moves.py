@@ -121,7 +121,6 @@ class Toy:
     data: DataSet
     own_angle: bool = False
     closed: bool = False
-    difference = 1e-3
 
     def velocities(self, parameters: Parameterisation, X: Matrix) -> Matrix:
         rows = X[:, : parameters.base] @ np.array(BASE[: parameters.base])

@@ -71,9 +71,9 @@ def test_what_stays_far_behind_a_selected_model_is_left_after_a_few_steps() -> N
     here = replace(objective)
     far = replace(fit, bic=fit.bic - 1e6)  # a selected model far better than any of these
     before = objective.counter.simulations
-    assert under(objective.data).fitted(space, here, fit, np.array([0.3]), space.score(far)) is None
+    assert under(objective.data).fitted(space, here, fit, np.array([0.4]), space.score(far)) is None
     short = objective.counter.simulations - before
-    assert under(objective.data).fitted(space, replace(objective), fit, np.array([0.3]), np.inf) is not None
+    assert under(objective.data).fitted(space, replace(objective), fit, np.array([0.4]), np.inf) is not None
     assert short < 0.8 * (objective.counter.simulations - before - short)
 
 
