@@ -20,10 +20,10 @@ from gaident.diagnosis.experiments.candidates import candidates, loop_notes, unr
 from gaident.diagnosis.experiments.excitation import excitation
 from gaident.diagnosis.explain.alternatives import LOG_SHIFT, alike_here, alternatives_of, impossible_here, integrator_start
 from gaident.diagnosis.explain.bending import bent_by, relevance_of
+from gaident.diagnosis.explain.beside import beside
 from gaident.diagnosis.explain.determined import determined, not_determined
 from gaident.diagnosis.explain.held_out import standing
 from gaident.diagnosis.explain.late_inside import late_inside
-from gaident.diagnosis.explain.late_together import late_together
 from gaident.diagnosis.explain.verdict import verdict_of
 from gaident.diagnosis.explain.wording import (
     ON_A_SPRING,
@@ -275,8 +275,8 @@ class Work:
         gains, driver, causes, estimates, offset, mechanics, model, check = self.judged()
         findings = findings_of_the_record(self._spoiled(), sum(len(r) for r in self.records), self.step)
         findings += [replace(f, gain=gains.of(f.effect)) for f in self.controller_steps]
-        estimates, together = late_together(self.under, self.estimate, self.found.space.allowed, estimates)
-        self.notes += together
+        mechanics, estimates, notes = beside(self.under, self.estimate, self.found.space.allowed, mechanics, estimates)
+        self.notes += notes
         self.doubts = like_filters(self.data, in_series(self.final)) or late_inside(self.under, self.estimate)
         for effect in causes:
             gain, rivals = self.rivals[effect]

@@ -47,3 +47,34 @@ def test_an_overshoot_of_more_than_a_tenth_is_another_speed() -> None:
     """The share of the time at the highest speed counts, and that is the overshoot's: the drag is tried."""
     rec = run(np.full(1500, 40.0), 1.9)
     assert rec.velocity.max() > 1.1 * 40.0 and said(rec) == ""
+
+
+def held(command: NDArray[np.float64], friction: float, seed: int) -> ga.Record:
+    """A run under the command, with white noise of 0.1 rad/s; the torque drives the model."""
+    drive = ga.OneMass(J=3e-4, D=2e-3).model()
+    if friction:
+        drive = drive.with_effect("coulomb_friction", torque=friction)
+    noise = 0.1 * np.random.default_rng(seed).standard_normal(len(command))
+    done = ga.run(drive, ga.Record(DT, command=command - noise, velocity=noise), ga.PI(0.03, 1.9))
+    return ga.Record(DT, velocity=done.velocity + noise, torque=done.torque)
+
+
+def test_the_viscous_friction_of_a_step_contains_the_dry_one_and_its_deviation_says_so() -> None:
+    """0.02 N m at 40 rad/s are 0.0005 N m s/rad: a quarter of the viscous friction, and not named in 120 samples."""
+    off, said = [], []
+    for seed in range(4):
+        dia = ga.diagnose(held(np.full(120, 40.0), 0.02, seed))
+        assert dia.verdict == "adequate" and not dia.causes
+        viscous = dia.mechanics["viscous_friction"]
+        off.append((viscous.value - 2e-3) / viscous.std)
+        said += [note for note in dia.notes if note.startswith("These data do not exclude coulomb friction")]
+    assert np.all(np.abs(off) < 3.0) and viscous.value > 2.4e-3, off
+    assert len(said) == 4 and "N m s/rad. Its deviation contains that." in said[0]
+
+
+def test_where_a_record_excludes_dry_friction_nothing_is_said_of_it() -> None:
+    levels = np.repeat([40.0, -25.0, 10.0, 60.0, -60.0, 5.0, -5.0, 30.0, 0.0, 20.0], 300)
+    dia = ga.diagnose(held(levels, 0.0, 1))
+    viscous = dia.mechanics["viscous_friction"]
+    assert dia.verdict == "adequate" and not any("do not exclude" in note for note in dia.notes)
+    assert abs(viscous.value - 2e-3) < 3.0 * viscous.std < 2e-5

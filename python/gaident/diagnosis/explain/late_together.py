@@ -25,7 +25,7 @@ from gaident.estimation.term import Term
 from gaident.policy.table import POLICY
 from gaident.results.estimate import Estimate
 
-__all__ = ["late_together"]
+__all__ = ["fitted_beside", "late_together"]
 
 
 def late_together(
@@ -37,7 +37,7 @@ def late_together(
         return dict(found), []
     alone = late[0]
     other = next((t for t in allowed if is_late(t) and t.place == "actuator" and t.name not in _same(alone.name)), None)
-    beside = None if other is None else _beside(objective, fit, other)
+    beside = None if other is None else fitted_beside(objective, fit, other)
     if other is None or beside is None:
         return dict(found), []
     ((name, value),) = found[alone.name].items()
@@ -57,7 +57,7 @@ def _same(effect: str) -> set[str]:
     return {effect, *equivalents(effect)}
 
 
-def _beside(objective: Objective, fit: Fit, term: Term) -> Fit | None:
+def fitted_beside(objective: Objective, fit: Fit, term: Term) -> Fit | None:
     """The model with one effect more, fitted again; None where that is no better, and the data exclude the effect."""
     longer = fit.hypothesis.extended(term)
     rows = term.starts(longer.parameters.scales)
