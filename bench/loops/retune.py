@@ -1,6 +1,6 @@
 """Gains that `ga.retune` proposes, on the drive that nobody knows: margins, settling, stiffness, torque.
 
-    python bench/retune.py [--drives 100] [--seed 0] [--out build/retune.jsonl]
+    python bench/loops/retune.py [--drives 100] [--seed 0] [--out build/retune.jsonl]
 
 Each drive is a random one of the tests' independent rig under a PI, or a two-mass drive of any inertia ratio, with nothing or one
 linear effect (delay, lag, filter, resonance) or dry friction in it.
@@ -25,7 +25,7 @@ from typing import Any
 for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
     os.environ.setdefault(name, "1")
 # ruff: noqa: E402
-BENCH = Path(__file__).resolve().parent
+BENCH = Path(__file__).resolve().parents[1]
 sys.path[:0] = [str(BENCH), str(BENCH.parent / "tests" / "python" / "support")]
 
 import numpy as np
