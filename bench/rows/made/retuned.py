@@ -1,6 +1,11 @@
-"""Gains that are proposed for random drives (bench/retune.py), and whether the true drive keeps what was asked for."""
+"""Gains that are proposed for random drives (bench/loops/retune.py), and whether the true drive keeps what was asked for."""
 
 from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "loops"))
 
 import retune
 from rows.case import Case, Result, digest

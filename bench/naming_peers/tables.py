@@ -1,0 +1,144 @@
+"""Thresholds by the open records, and the tables of the closed ones: pure functions of the lines that naming.py writes."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from blind_tables import listing, table
+from scipy.stats import norm
+
+from blind_judge import CLASSES, EQUIVALENT
+from drive_rig import OUTSIDE
+
+Line = dict[str, Any]
+
+LEAST_GAIN = 0.02
+"""Share of the linear model's error that the oracle has to gain, or the record shows no gain."""
+
+
+def wilson(hits: int, n: int, level: float = 0.95) -> tuple[float, float]:
+    """Wilson's interval of a rate."""
+    z = float(norm.ppf(0.5 + 0.5 * level))
+    middle, half = (hits + 0.5 * z * z) / (n + z * z), z / (n + z * z) * np.sqrt(hits * (n - hits) / n + 0.25 * z * z)
+    return max(0.0, float(middle - half)), min(1.0, float(middle + half))
+
+
+def rate(flags: Iterable[bool]) -> str:
+    """Count and interval."""
+    listed = list(flags)
+    if not listed:
+        return "-"
+    low, high = wilson(sum(listed), len(listed))
+    return f"{sum(listed)}/{len(listed)} [{100 * low:.0f}, {100 * high:.0f}]"
+
+
+def right(line: Line, judged: Mapping[str, Any]) -> bool:
+    """Nothing named where nothing is hidden, no wrong name outside the library, else every effect, and no wrong name.
+
+    Of an effect that no record tells from another one, its own name is asked for here too: a method may know such classes.
+    """
+    hidden = line["cell"]["effects"]
+    if not hidden:
+        return not judged["named"]
+    if set(hidden) & set(OUTSIDE):
+        return not judged["wrong"]
+    return bool(judged["in_set"] and not judged["wrong"])
+
+
+def chosen_threshold(lines: Sequence[Line]) -> str | None:
+    """The threshold with the most right records less those with a wrong name; of several the middle one."""
+    if not lines:
+        return None
+    scores = []
+    for threshold in lines[0]["answers"]:
+        judged = [(x, x["answers"][threshold]["judged"]) for x in lines]
+        scores.append(sum(right(x, j) - bool(j["wrong"]) for x, j in judged))
+    best = [t for t, score in zip(lines[0]["answers"], scores, strict=True) if score == max(scores)]
+    return best[len(best) // 2]
+
+
+def middle(lines: Sequence[Line]) -> str:
+    """The threshold in the middle of the grid, where no open record chooses one."""
+    grid = list(lines[0]["answers"])
+    return grid[len(grid) // 2]
+
+
+def gain(line: Line, answer: Mapping[str, Any]) -> float | None:
+    """Fall of the held-out rmse over the oracle's; None where there is none, or nothing to gain."""
+    oracle, before, after = line.get("oracle"), line.get("before"), answer["rmse"]
+    if oracle is None or after is None or not before or before - oracle < LEAST_GAIN * before:
+        return None
+    return float((before - after) / (before - oracle)) if np.isfinite(after) else -np.inf
+
+
+def middle_of(values: Iterable[float | None], unit: str = "") -> str:
+    known = [v for v in values if v is not None]
+    return f"{np.median(known):.3g}{unit}" if known else "-"
+
+
+def report(lines: Sequence[Line], lines_of_code: Mapping[str, int], names_nothing: Sequence[str]) -> str:
+    """All tables. Asserts that every method saw the same records."""
+    by_phase = {phase: [x for x in lines if x["phase"] == phase and "answers" in x] for phase in ("open", "closed")}
+    digests: dict[str, str] = {}
+    for x in by_phase["closed"] + by_phase["open"]:
+        key = x["key"].rsplit("/", 1)[0]
+        assert digests.setdefault(key, x["digest"]) == x["digest"], f"{x['method']} saw another record: {key}"
+    closed = by_phase["closed"]
+    names, figures, mistakes = [], [], []
+    for method in [m for m in lines_of_code if any(x["method"] == m for x in closed)]:
+        mine = [x for x in closed if x["method"] == method]
+        threshold = chosen_threshold([x for x in by_phase["open"] if x["method"] == method]) or middle(mine)
+        answers = [(x, x["answers"][threshold]) for x in mine]
+        judged = [(x, a["judged"]) for x, a in answers]
+        if method not in names_nothing:
+            names.append([method, f"{float(threshold):g}", *_names_row(judged)])
+            mistakes.append([method, *_mistakes(judged)])
+        gains = [gain(x, a) for x, a in answers if x["cell"]["group"] in ("effects", "pairs")]
+        errors = [e for _, j in judged for e in j["parameter_errors"].values()]
+        known = [g for g in gains if g is not None]
+        figures.append([method, f"{middle_of(gains)} (n = {len(known)})",
+                        f"{100 * np.median(errors):.2g} % (n = {len(errors)})" if errors else "-",
+                        middle_of(x["seconds"] for x in mine), f"{max(x['seconds'] for x in mine):.3g}",
+                        lines_of_code[method]])  # fmt: skip
+    head = ["method", "threshold", "false alarms", "exact", "in set", "wrong name", "of them its equivalent", "two: both found",
+            "loops: in set", "outside: wrong name"]  # fmt: skip
+    parts = [
+        f"{len({x['key'].rsplit('/', 1)[0] for x in closed})} closed records, thresholds by "
+        f"{len({x['key'].rsplit('/', 1)[0] for x in by_phase['open']})} open ones; counts with Wilson's 95 % intervals in %",
+        table(head, names),
+        table(["method", "held-out gain over the oracle's", "parameter error", "seconds, median", "longest", "lines"], figures),
+        table(["method", "clean: named", "hidden: named wrongly"], mistakes),
+    ]
+    crashed = [f"- {x['key']}: {x['crash']}" for x in lines if "crash" in x]
+    return "\n\n".join(parts + (["Crashes:\n\n" + "\n".join(crashed)] if crashed else []))
+
+
+def _names_row(judged: Sequence[tuple[Line, Mapping[str, Any]]]) -> list[str]:
+    clean = [(x, j) for x, j in judged if not x["cell"]["effects"]]
+    loops = [(x, j) for x, j in judged if x["cell"]["group"] == "loops" and x["cell"]["effects"]]
+    one = [(x, j) for x, j in judged if x["cell"]["group"] == "effects"]
+    apart = [(x, j) for x, j in one if x["cell"]["effects"][0] not in CLASSES]
+    pairs = [(x, j) for x, j in judged if x["cell"]["group"] == "pairs"]
+    outside = [(x, j) for x, j in judged if x["cell"]["group"] == "outside"]
+    wrong = [(x, j) for x, j in (*one, *pairs, *loops) if j["wrong"]]
+    alike = [{EQUIVALENT.get(e, e) for e in x["cell"]["effects"]} >= set(j["wrong"]) for x, j in wrong]
+    return [
+        rate(bool(j["named"]) for _, j in clean),
+        rate(j["exact"] for _, j in apart),
+        rate(j["in_set"] for _, j in one),
+        rate(bool(j["wrong"]) for _, j in (*one, *pairs, *loops)),
+        str(sum(alike)),
+        rate(j["in_set"] for _, j in pairs),
+        rate(j["in_set"] for _, j in loops),
+        rate(bool(j["wrong"]) for _, j in outside),
+    ]
+
+
+def _mistakes(judged: Sequence[tuple[Line, Mapping[str, Any]]]) -> list[str]:
+    from collections import Counter
+
+    clean = Counter(name for x, j in judged if not x["cell"]["effects"] for name in j["named"])
+    wrong = Counter(name for x, j in judged if x["cell"]["effects"] for name in j["wrong"])
+    return [listing(clean), listing(wrong)]
