@@ -39,7 +39,7 @@ from case import Case, drawn
 from in_the_loop import refitted
 from json_lines import read, work
 from methods import Method, methods
-from tables import chosen_threshold, middle, report
+from naming_tables import chosen_threshold, middle, report
 
 from drive_cases import NOISE_EFFECTS
 

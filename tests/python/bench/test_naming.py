@@ -90,7 +90,7 @@ def test_the_cells_have_a_logged_torque_and_each_is_there_once(naming: Any) -> N
 
 
 def test_a_threshold_is_chosen_by_right_records_less_wrong_names() -> None:
-    tables = importlib.import_module("tables")
+    tables = importlib.import_module("naming_tables")
 
     def line(effects: list[str], **named: list[str]) -> dict[str, Any]:
         judged = {
@@ -104,7 +104,7 @@ def test_a_threshold_is_chosen_by_right_records_less_wrong_names() -> None:
 
 
 def test_wilsons_interval_has_its_closed_forms() -> None:
-    tables = importlib.import_module("tables")
+    tables = importlib.import_module("naming_tables")
     z2 = 1.959963984540054**2
     low, high = tables.wilson(0, 10)
     assert low == 0.0 and high == pytest.approx(z2 / (10 + z2))
