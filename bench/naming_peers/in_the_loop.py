@@ -39,9 +39,9 @@ MOST = 3
 """Effects in one model at most."""
 FITTED = 0.7
 """Share of the record that the ladder fits; it validates on the rest."""
-LADDER = (0.002, 0.005, 0.01, 0.02, 0.03, 0.05, 0.1, 0.2, 0.4)
+LADDER = (0.01, 0.03, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8)
 """Thresholds: share by which an effect has to lower the validation error."""
-UNITS = (0.0, 5.0, 10.0, 20.0, 50.0, 100.0, 200.0, 500.0, 1000.0, 2000.0)
+UNITS = (10.0, 100.0, 500.0, 1000.0, 2000.0, 3000.0, 5000.0, 7000.0, 10000.0, 15000.0)
 """Thresholds: BIC units that an effect has to gain."""
 
 

@@ -21,7 +21,7 @@ from names import library_of, with_parameters
 from numpy.typing import NDArray
 from scipy.stats import f as fisher
 
-LEVELS = (1e-2, 1e-3, 1e-4, 1e-6, 1e-9, 1e-12, 1e-20, 1e-30, 1e-50, 1e-80)
+LEVELS = (1e-3, 1e-6, 1e-12, 1e-20, 1e-30, 1e-50, 1e-80, 1e-120, 1e-170, 1e-250)
 """Thresholds: the p-value below which an effect is accepted."""
 BLOCKS, BINS, OUT = 24, 8, 3.5
 """Blocks of time; bins of each coordinate; deviations by which a cell stands out."""

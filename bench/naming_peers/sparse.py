@@ -14,7 +14,7 @@ from case import Answer, Case
 from names import library_of, own_columns, with_parameters
 from numpy.typing import NDArray
 
-SHARES = (0.02, 0.04, 0.06, 0.08, 0.1, 0.13, 0.16, 0.2, 0.25, 0.3, 0.4, 0.5, 0.6)
+SHARES = (0.05, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9)
 """Thresholds: of the rms of what the linear model leaves."""
 BAGS = 20
 MOST_ROWS = 1200
