@@ -1,7 +1,7 @@
 """Who names the cause? gaident and its peers on the same blind records, judged by the same code.
 
     pip install .[naming]                       # scikit-learn, PySINDy, SysIdentPy; what is not installed is left out
-    python bench/naming.py --out naming.jsonl [--cases 1] [--open-cases 1] [--seed 1] [--only METHOD ...] [--workers 1]
+    python bench/naming.py --out naming.jsonl [--cases 1] [--open-cases 1] [--seed 1] [--only NAME ...] [--workers 1]
     python bench/naming.py --out naming.jsonl --report
 
 Records are those of bench/blind.py with a logged torque: clean ones, one effect, two effects, effects outside the library, and
@@ -127,7 +127,7 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--open-seed", type=int, default=501)
     parser.add_argument("--groups", nargs="+", choices=GROUPS, default=list(GROUPS))
-    parser.add_argument("--only", nargs="+", choices=list(methods(Path())), metavar="METHOD", help=", ".join(methods(Path())))
+    parser.add_argument("--only", nargs="+", choices=list(methods(Path())), metavar="NAME", help=", ".join(methods(Path())))
     parser.add_argument("--training", type=int, default=1000, help="records that the classifier learns from")
     parser.add_argument("--training-file", type=Path, default=Path("build/naming_training.npz"))
     parser.add_argument("--workers", type=int, default=1)

@@ -94,10 +94,10 @@ def report(lines: Sequence[Line], lines_of_code: Mapping[str, int], names_nothin
         answers = [(x, x["answers"][threshold]) for x in mine]
         judged = [(x, a["judged"]) for x, a in answers]
         if method not in names_nothing:
-            names.append([method, f"{float(threshold):g}", *_names_row(judged)])
+            names.append([method, _shown(mine, threshold), *_names_row(judged)])
             mistakes.append([method, *_mistakes(judged)])
             loose = chosen_threshold(opened, 0.0) or threshold
-            lenient.append([method, f"{float(loose):g}", *_names_row([(x, x["answers"][loose]["judged"]) for x in mine])])
+            lenient.append([method, _shown(mine, loose), *_names_row([(x, x["answers"][loose]["judged"]) for x in mine])])
         gains = [gain(x, a) for x, a in answers if x["cell"]["group"] in ("effects", "pairs")]
         errors = [e for _, j in judged for e in j["parameter_errors"].values()]
         known = [g for g in gains if g is not None]
@@ -118,6 +118,11 @@ def report(lines: Sequence[Line], lines_of_code: Mapping[str, int], names_nothin
     ]
     crashed = [f"- {x['key']}: {x['crash']}" for x in lines if "crash" in x]
     return "\n\n".join(parts + (["Crashes:\n\n" + "\n".join(crashed)] if crashed else []))
+
+
+def _shown(lines: Sequence[Line], threshold: str) -> str:
+    """A threshold, nothing for a method that has none to choose."""
+    return f"{float(threshold):g}" if len(lines[0]["answers"]) > 1 else ""
 
 
 def _names_row(judged: Sequence[tuple[Line, Mapping[str, Any]]]) -> list[str]:
