@@ -42,8 +42,8 @@ MECHANICS = {
 WHOLE = 2  # no decision: how many of these every axis has
 
 
-def mechanics_of(objective: Objective, fit: Fit) -> dict[str, Estimate]:
-    """Name -> Estimate, fitted together with the effects; deviations to first order.
+def mechanics_of(objective: Objective, fit: Fit, more: NDArray[np.float64] | None = None) -> dict[str, Estimate]:
+    """Name -> Estimate, fitted together with the effects; deviations to first order; more: added to the covariance of x.
 
     Of a pair of poles or zeros that does not swing (damping ratio 1 or more), or where an undamped shaft would need a negative
     stiffness, e0 + a e1 <= f0, only inertia and viscous friction of the whole are given.
@@ -51,6 +51,8 @@ def mechanics_of(objective: Objective, fit: Fit) -> dict[str, Estimate]:
     parameters = fit.parameters
     base = slice(parameters.base)
     cov, of_controller = covariance_of(objective, fit)[base, base], controller_part(objective, fit)[base, base]
+    if more is not None:
+        cov = cov + more[base, base]
     found, slopes = _with_slopes(fit)
     known = np.isfinite(np.diag(cov))
     finite = np.where(known[:, None] & known[None, :], cov, 0.0)

@@ -20,7 +20,7 @@ from gaident.diagnosis.experiments.candidates import candidates, loop_notes, unr
 from gaident.diagnosis.experiments.excitation import excitation
 from gaident.diagnosis.explain.alternatives import LOG_SHIFT, alike_here, alternatives_of, impossible_here, integrator_start
 from gaident.diagnosis.explain.bending import bent_by, relevance_of
-from gaident.diagnosis.explain.beside import beside
+from gaident.diagnosis.explain.beside import friction_beside, late_together
 from gaident.diagnosis.explain.determined import determined, not_determined
 from gaident.diagnosis.explain.held_out import standing
 from gaident.diagnosis.explain.late_inside import late_inside
@@ -275,8 +275,8 @@ class Work:
         gains, driver, causes, estimates, offset, mechanics, model, check = self.judged()
         findings = findings_of_the_record(self._spoiled(), sum(len(r) for r in self.records), self.step)
         findings += [replace(f, gain=gains.of(f.effect)) for f in self.controller_steps]
-        mechanics, estimates, notes = beside(self.under, self.estimate, self.found.space.allowed, mechanics, estimates)
-        self.notes += notes
+        estimates, together = late_together(self.under, self.estimate, self.found.space.allowed, estimates)
+        more, notes = friction_beside(self.under, self.estimate)
         self.doubts = like_filters(self.data, in_series(self.final)) or late_inside(self.under, self.estimate)
         for effect in causes:
             gain, rivals = self.rivals[effect]
@@ -294,7 +294,7 @@ class Work:
             driver = driver or ("velocity" if impossible == "viscous_friction" else "past")
         real = [f for f in findings if not f.is_noise]
         answered = {*self.not_testable, *(name for f in findings for name in (f.effect, *f.alternatives))}
-        self.notes += self.doubts
+        self.notes += (*together, *notes, *self.doubts)
         verdict = verdict_of(bool(real), driver is not None, bool(self.doubts) or (self.data.slower and self.driving.in_doubt))
         if driver is not None and (dropped := [e for e in self.final.effects if e not in causes]):
             shown = driver if self.left.gains[driver] > self.left.needed else None
@@ -324,12 +324,12 @@ class Work:
             gain_interval=gains.interval,
             held_out=gains.held_out,
             base_shift=base_shift(self.base, self.estimate),
-            covariance=model_covariance(self.under, self.estimate, self._made) if extended else self.idn.covariance,
+            covariance=model_covariance(self.under, self.estimate, self._made, more) if extended else self.idn.covariance,
             left=self.left.gains,
             left_needed=self.left.needed,
             line=self.left.line if driver == "time" else None,
             one_sided={e: sizes for e, sizes in self.excited.one_sided.items() if e not in answered},
-            mechanics=mechanics,
+            mechanics=mechanics_of(self.under, self.estimate, more),
             regression=check.regression,
             regression_force_error=check.force_error,
             comparisons=check.comparisons,

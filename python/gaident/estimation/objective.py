@@ -46,6 +46,7 @@ T = TypeVar("T")
 HEAD = 12  # no decision: parts of the shortest record, of which a filter's start takes one at most
 LOST = 1e60  # no decision: rad/s: the error of a model that diverges, every sample; its squares stay numbers
 DIFFERENCE = 1e-6  # no decision: the step of a difference; small beside any standard deviation, within which errors may bend
+ROUGH = 1e-3  # no decision: the step of a difference, beside effects whose errors jump
 
 
 class NoiseFamily(Protocol):
@@ -323,7 +324,7 @@ class Objective:
         parameters = hypothesis.parameters
         steps, limits = parameters.steps(), parameters.limits()
         moved = np.flatnonzero(steps > 0.0)
-        h = DIFFERENCE * steps
+        h = (DIFFERENCE if all(t.smooth for t in parameters.terms) else ROUGH) * steps
         h = np.where(x + h > limits[1], -h, h)
         X = np.repeat(x[None, :], len(moved) + 1, axis=0)
         X[np.arange(1, len(moved) + 1), moved] += h[moved]

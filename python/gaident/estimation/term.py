@@ -93,6 +93,7 @@ class Term:
     levels: bool = False  # its first coordinate is the level of dry friction
     time_varying: bool = False  # its size changes in the course of a record: a mean over the record is none of its parameters
     at_peaks: bool = False  # it acts at the largest torques only
+    smooth: bool = True  # what it makes of a small change is small; a function of the user's may round, or jump at a threshold
     late: bool = False  # it makes the measured velocity late, which a logged angle shows
     resonates: bool = False  # a pair of poles and zeros in series with the mechanism, equivalent to a second mass
     poles: Callable[[Vector], tuple[complex, ...]] | None = None  # poles in series [rad/s] of natural parameters

@@ -40,7 +40,7 @@ from gaident.models.model import Model
 from gaident.policy.table import POLICY
 from gaident.results.estimate import Estimate
 
-__all__ = ["age_part", "controller_part", "covariance_of", "estimates_of", "model_covariance"]
+__all__ = ["age_part", "controller_part", "covariance_of", "estimates_of", "local_covariance", "model_covariance"]
 
 BLOCKS = 8  # no decision: how many parts of a jackknife
 
@@ -51,6 +51,11 @@ Matrix = NDArray[np.float64]
 def covariance_of(objective: Objective, fit: Fit) -> Matrix:
     """Covariance of x, computed once for a fit; infinite where the record does not determine it, 0 for entries not fitted."""
     return objective.once(("covariance", fit.key), lambda: _covariance(objective, fit))
+
+
+def local_covariance(objective: Objective, fit: Fit) -> Matrix:
+    """The part of the covariance that the slopes at x and the errors there make."""
+    return _at_one_point(objective, fit, *objective.linearised(fit.hypothesis, fit.x, fit.noise))
 
 
 def controller_part(objective: Objective, fit: Fit) -> Matrix:
@@ -142,13 +147,17 @@ def _at_one_point(objective: Objective, fit: Fit, v: Vector, J: Matrix) -> Matri
     return cov
 
 
-def model_covariance(objective: Objective, fit: Fit, made: Callable[[Vector], Model]) -> tuple[tuple[float, ...], ...] | None:
-    """Covariance of the `model_numbers` of a fit, to first order; made: x -> model, with known settings beside.
+def model_covariance(
+    objective: Objective, fit: Fit, made: Callable[[Vector], Model], more: Matrix
+) -> tuple[tuple[float, ...], ...] | None:
+    """Covariance of the `model_numbers` of a fit, to first order; more: to be added to that of x.
+
+    made: x -> model, with known settings beside.
 
     None where the records leave a number open, and where a small step makes two real roots of a pair.
     """
     count = fit.parameters.size - sum(fit.parameters.starts)
-    cov = covariance_of(objective, fit)[:count, :count]
+    cov = (covariance_of(objective, fit) + more)[:count, :count]
     if not np.all(np.isfinite(cov)):
         return None
     found = model_numbers(made(fit.x))

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import gaident as ga
-from gaident.diagnosis.explain.late_together import late_together
+from gaident.diagnosis.explain.beside import late_together
 from gaident.diagnosis.library.terms import LIBRARY
 from gaident.diagnosis.records.sizes import scales_of
 from gaident.estimation import least_squares as ls

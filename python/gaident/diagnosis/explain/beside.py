@@ -1,13 +1,22 @@
-"""What effects that every axis has, and that a model lacks, would change in its numbers: dry friction, and a delay beside a lag.
+"""How far numbers may be off by what every axis has, a model lacks, and the records do not exclude.
 
-Every axis has dry friction, and a record of few speeds shows its sum with viscous friction far better than the parts.
-So dry friction is added to a model that has none, and all is fitted again:
+**Friction.** Every axis has dry friction, and many have drag.
+A record of few speeds shows their sum with viscous friction far better than the parts.
+So each friction of one number that the inverse-dynamics regression knows, dry friction and quadratic drag, is added to a model
+that has none, all is fitted again, and x gets the covariance
 
-    std^2 = std_alone^2 + (value - value beside dry friction)^2
+    larger(C, C_beside) - C + d d',   d = x beside that friction - x,   C, C_beside: of x in the one fit and in the other
 
-Where the data exclude dry friction the second part is nothing.
-Whether it is named is another matter, which the criterion decides.
-Of delays and lags see `late_together.py`.
+of the friction with which the viscous friction is known least (`larger`: see `regression.larger_of`).
+A friction whose size comes out as 0 moves nothing, but its slopes widen what is known of the rest.
+
+**Delay and lag.** Every drive has some of either, and a log shows their sum far better than the parts.
+Where a model has one of them alone, the other one is added, and all is fitted again:
+
+    std^2 = std_alone^2 + (value - value beside the other)^2
+
+Where the records exclude what is added, these parts are small.
+The name is another matter: the criterion decides it, and what no record tells apart is among the alternatives.
 """
 
 from __future__ import annotations
@@ -16,50 +25,111 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from gaident.axis import Text, called, say
-from gaident.diagnosis.explain.late_together import fitted_beside, late_together
-from gaident.diagnosis.mechanics import moved
+from gaident.diagnosis.explain.late_inside import is_late
+from gaident.diagnosis.library.equivalences import equivalents
+from gaident.diagnosis.library.terms import LIBRARY
+from gaident.diagnosis.mechanics import mechanics_of, of_no_axis
+from gaident.estimation import least_squares as ls
 from gaident.estimation.objective import Fit, Objective
+from gaident.estimation.regression.regression import larger_of
 from gaident.estimation.term import Term
+from gaident.estimation.uncertainty import local_covariance
 from gaident.policy.table import POLICY
 from gaident.results.estimate import Estimate
 
-__all__ = ["beside"]
+__all__ = ["friction_beside", "late_together"]
+
+Matrix = NDArray[np.float64]
+NAME = "viscous_friction"
 
 
-def beside(
-    objective: Objective,
-    fit: Fit,
-    allowed: Sequence[Term],
-    mechanics: Mapping[str, Estimate],
-    effects: Mapping[str, dict[str, Estimate]],
-) -> tuple[dict[str, Estimate], dict[str, dict[str, Estimate]], list[Text]]:
-    """(mechanics, estimates of effects, notes), with what such an effect would change; given: those of the model alone."""
-    estimates, notes = late_together(objective, fit, allowed, effects)
-    numbers, more = _friction(objective, fit, allowed, mechanics)
-    return numbers, estimates, [*notes, *more]
+def friction_beside(objective: Objective, fit: Fit) -> tuple[Matrix, list[Text]]:
+    """(covariance to be added to that of x, notes).
+
+    0 for a model with friction, with impacts, whose minima differ by more than this, and for what no axis is.
+    """
+    part = np.zeros((len(fit.x), len(fit.x)))
+    alone = mechanics_of(objective, fit)
+    viscous = alone.get(NAME)
+    if viscous is None or not np.isfinite(viscous.std) or of_no_axis(alone) is not None:
+        return part, []
+    if fit.impacts or any(_is_friction(fit, t) for t in fit.parameters.terms):
+        return part, []
+    widest, of = viscous.std, None
+    for term in LIBRARY.values():
+        if _is_friction(fit, term) and term.size == 1 and term.regressed is not None and not term.at_load:
+            more = _part(objective, fit, term)
+            std = mechanics_of(objective, fit, more)[NAME].std
+            if std > widest:
+                part, widest, of = more, std, term
+    if of is None or not widest > max(POLICY.contradiction * viscous.std, POLICY.check_share * abs(viscous.value)):
+        return part, []
+    text = "These data do not tell viscous friction from {}, of which every axis may have some: its deviation contains that."
+    return part, [say(text, called(of.name))]
 
 
-def _friction(
-    objective: Objective, fit: Fit, allowed: Sequence[Term], mechanics: Mapping[str, Estimate]
-) -> tuple[dict[str, Estimate], list[Text]]:
-    found = dict(mechanics)
-    friction = next((t for t in allowed if t.levels and t.simplest and not t.at_load), None)
-    if friction is None or any(t.levels or t.family == friction.family for t in fit.parameters.terms):
-        return found, []
-    other = fitted_beside(objective, fit, friction)
-    if other is None:
-        return found, []
-    changed = {name: pair for name, pair in moved(fit, other).items() if name in found}
-    for name, (alone, together) in changed.items():
-        found[name] = replace(found[name], std=float(np.hypot(found[name].std, together - alone)))
-    name = "viscous_friction"
-    if name not in changed or not found[name].std > POLICY.contradiction * mechanics[name].std:
-        return found, []
-    level = float(friction.natural(other.x[other.parameters.slot(friction.name)][None, :])[0, 0])
-    text = (
-        "These data do not exclude {}: beside one of {:.3g} {N m} the viscous friction would be {:.3g} {N m s/rad}. "
-        "Its deviation contains that."
+def _is_friction(fit: Fit, term: Term) -> bool:
+    """Whether its torque is a function of the velocity that brakes, whatever the size."""
+    return term.levels or (term.curve is not None and term.limits(fit.parameters.scales)[0][0] >= 0.0)
+
+
+def _part(objective: Objective, fit: Fit, term: Term) -> Matrix:
+    """The covariance for one friction; 0 where the model with it diverges, or loses what the one without it shows."""
+    longer = fit.hypothesis.extended(term)
+    scales = longer.parameters.scales
+    rows = [tuple(low for low, _ in term.limits(scales)), *term.starts(scales)]
+    X = np.array([fit.parameters.inserted(fit.x, np.array(row)) for row in rows])
+    start = X[int(np.argmin(objective.costs(longer, X, fit.noise)))]
+    other = ls.fit(objective, longer, start, fit.noise, POLICY.usual)
+    kept = np.delete(np.arange(len(other.x)), longer.parameters.slot(term.name))
+    C, beside, move = (
+        local_covariance(objective, fit),
+        local_covariance(objective, other)[np.ix_(kept, kept)],
+        other.x[kept] - fit.x,
     )
-    return found, [say(text, called(friction.name), level, changed[name][1])]
+    known = np.isfinite(np.diag(C)) & np.isfinite(np.diag(beside))
+    part, at = np.zeros_like(C), np.ix_(known, known)
+    part[at] = larger_of(C[at], beside[at]) - C[at] + np.outer(move[known], move[known])
+    return part
+
+
+def late_together(
+    objective: Objective, fit: Fit, allowed: Sequence[Term], found: Mapping[str, dict[str, Estimate]]
+) -> tuple[dict[str, dict[str, Estimate]], list[Text]]:
+    """(estimates of effects with what another late one would change, notes); found: those of the model alone."""
+    late = [t for t in fit.parameters.terms if is_late(t) and t.name in found]
+    if len(late) != 1 or fit.impacts or late[0].size != 1:
+        return dict(found), []
+    alone = late[0]
+    other = next((t for t in allowed if is_late(t) and t.place == "actuator" and t.name not in _same(alone.name)), None)
+    beside = None if other is None else _beside(objective, fit, other)
+    if other is None or beside is None:
+        return dict(found), []
+    ((name, value),) = found[alone.name].items()
+    moved = float(alone.natural(beside.x[beside.parameters.slot(alone.name)][None, :])[0, 0])
+    wider = replace(value, std=float(np.hypot(value.std, moved - value.value)))
+    estimates = {**found, alone.name: {name: wider}}
+    if abs(moved - value.value) <= POLICY.contradiction * value.std or value.unit != "s":
+        return estimates, []
+    text = (
+        "What is late here is one number, {:.3g} ms: beside a {} the {} would be {:.3g} ms, and these data do not tell how much "
+        "each of them is. Its deviation contains that."
+    )
+    return estimates, [say(text, 1e3 * value.value, called(other.name), called(alone.name), 1e3 * moved)]
+
+
+def _same(effect: str) -> set[str]:
+    return {effect, *equivalents(effect)}
+
+
+def _beside(objective: Objective, fit: Fit, term: Term) -> Fit | None:
+    """The model with one effect more, fitted again; None where that is no better, and the data exclude the effect."""
+    longer = fit.hypothesis.extended(term)
+    rows = term.starts(longer.parameters.scales)
+    X = np.array([fit.parameters.inserted(fit.x, np.array(row)) for row in rows])
+    start = X[int(np.argmin(objective.costs(longer, X, fit.noise)))]
+    beside = ls.fit(objective, longer, start, fit.noise, POLICY.usual)
+    return beside if beside.cost < fit.cost else None

@@ -103,4 +103,5 @@ def _term(row: Row) -> Cause:
         lambda scales: list(rows),
         lambda scales: steps,
         needs=(in_a_loop,) if row.place == "controller" else (),
+        smooth=False,
     )

@@ -173,15 +173,15 @@ class Moves(Repeated):
         return found + [f for f in others if f.parameters.terms[-1] in hopeful]
 
     def _best(self, now: Fit, fits: Sequence[Fit]) -> list[Fit]:
-        """Those that are mechanisms, best first, in the loop where the best one is.
+        """Those that are mechanisms, best first, in the loop where the one of lowest BIC is: another predictor has other errors.
 
         A second mass that took the place of an effect has to swing on its shaft; one that does not describes something else.
         """
         fits = [f for f in fits if f.parameters.masses == now.parameters.masses or self.swings(f)]
         found = sorted((f for f in fits if f.cost < WORST and is_mechanism(f.parameters, f.x)), key=self.score)
-        if found and found[0].predictor.closed:
+        if found and (lead := min(found, key=lambda f: f.bic)).predictor.closed:
             count = self.policy.screened
-            found = [self.under_predictor_of(f, found[0]) for f in found[:count]] + found[count:]
+            found = [self.under_predictor_of(f, lead) for f in found[:count]] + found[count:]
             found = sorted(found, key=self.score)
         return found
 
