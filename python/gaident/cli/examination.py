@@ -19,7 +19,7 @@ __all__ = ["Examination", "UsedLibrary", "examine"]
 _REQUIREMENT = re.compile(r"^([\w.-]+)[^;]*(?:;(.*))?$")
 _EXTRA = re.compile(r"extra\s*==\s*['\"]([\w.-]+)['\"]")
 _MODULES = {"pillow": "PIL"}  # what is imported, where it is not the distribution's name
-_FOR_DEVELOPERS = {"test", "peers", "compare", "tidy", "docs", "release"}
+_FOR_DEVELOPERS = {"test", "peers", "compare", "naming", "tidy", "docs", "release"}
 
 
 @dataclass(frozen=True)

@@ -31,7 +31,7 @@ __all__ = [
 
 WIDTH = 100  # no decision: printed: letters of a line
 GAINS = {"kp", "ki"}
-SPREAD = "is what noise makes and the record leaves open; what the model gets wrong may move a value further."
+SPREAD = "is what noise makes and the record leaves open; what the model gets wrong may come on top."
 """Of a standard deviation; stands behind its sign."""
 NOT_AS_GIVEN = {
     "integration_rule": "the controller has another integration rule than the one given or assumed",
