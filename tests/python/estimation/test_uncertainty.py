@@ -118,7 +118,7 @@ def test_what_the_steps_of_a_simulation_move_is_in_them(dt: float, substeps: int
 
 
 def test_slopes_are_those_at_a_point_however_soon_the_errors_bend() -> None:
-    """A cogging under the simulated angle: 0.1 % of the inertia turns it by a period within 3 s, its errors bend long before."""
+    """A cogging under the simulated angle: 0.1 % of the gain moves it by a part of its period in 3 s, and errors bend before."""
     term = LIBRARY["cogging"]
     push = 0.2 + 0.1 * np.sin(2.0 * np.pi * np.arange(N) * DT / 1.1)
     still = ga.Record(DT, velocity=np.zeros(N), torque=push)

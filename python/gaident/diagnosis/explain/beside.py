@@ -67,7 +67,7 @@ def friction_beside(objective: Objective, fit: Fit) -> tuple[Matrix, list[Text]]
                 part, widest, of = more, std, term
     if of is None or not widest > max(POLICY.contradiction * viscous.std, POLICY.check_share * abs(viscous.value)):
         return part, []
-    text = "These data do not tell viscous friction from {}, of which every axis may have some: its deviation contains that."
+    text = "These data do not tell viscous friction from {}: the deviations of the mechanics contain what that would change."
     return part, [say(text, called(of.name))]
 
 
@@ -77,19 +77,12 @@ def _is_friction(fit: Fit, term: Term) -> bool:
 
 
 def _part(objective: Objective, fit: Fit, term: Term) -> Matrix:
-    """The covariance for one friction; 0 where the model with it diverges, or loses what the one without it shows."""
-    longer = fit.hypothesis.extended(term)
-    scales = longer.parameters.scales
-    rows = [tuple(low for low, _ in term.limits(scales)), *term.starts(scales)]
-    X = np.array([fit.parameters.inserted(fit.x, np.array(row)) for row in rows])
-    start = X[int(np.argmin(objective.costs(longer, X, fit.noise)))]
-    other = ls.fit(objective, longer, start, fit.noise, POLICY.usual)
-    kept = np.delete(np.arange(len(other.x)), longer.parameters.slot(term.name))
-    C, beside, move = (
-        local_covariance(objective, fit),
-        local_covariance(objective, other)[np.ix_(kept, kept)],
-        other.x[kept] - fit.x,
-    )
+    """The covariance for one friction; 0 for what either fit does not determine."""
+    lowest = tuple(low for low, _ in term.limits(fit.parameters.scales))
+    other = _beside(objective, fit, term, [lowest])
+    kept = np.delete(np.arange(len(other.x)), other.parameters.slot(term.name))
+    C, move = local_covariance(objective, fit), other.x[kept] - fit.x
+    beside = local_covariance(objective, other)[np.ix_(kept, kept)]
     known = np.isfinite(np.diag(C)) & np.isfinite(np.diag(beside))
     part, at = np.zeros_like(C), np.ix_(known, known)
     part[at] = larger_of(C[at], beside[at]) - C[at] + np.outer(move[known], move[known])
@@ -106,7 +99,7 @@ def late_together(
     alone = late[0]
     other = next((t for t in allowed if is_late(t) and t.place == "actuator" and t.name not in _same(alone.name)), None)
     beside = None if other is None else _beside(objective, fit, other)
-    if other is None or beside is None:
+    if other is None or beside is None or not beside.cost < fit.cost:  # no better: the data exclude it
         return dict(found), []
     ((name, value),) = found[alone.name].items()
     moved = float(alone.natural(beside.x[beside.parameters.slot(alone.name)][None, :])[0, 0])
@@ -125,11 +118,10 @@ def _same(effect: str) -> set[str]:
     return {effect, *equivalents(effect)}
 
 
-def _beside(objective: Objective, fit: Fit, term: Term) -> Fit | None:
-    """The model with one effect more, fitted again; None where that is no better, and the data exclude the effect."""
+def _beside(objective: Objective, fit: Fit, term: Term, more: Sequence[tuple[float, ...]] = ()) -> Fit:
+    """The model with one effect more, fitted again from the best of its starts and of more of them."""
     longer = fit.hypothesis.extended(term)
-    rows = term.starts(longer.parameters.scales)
+    rows = [*more, *term.starts(longer.parameters.scales)]
     X = np.array([fit.parameters.inserted(fit.x, np.array(row)) for row in rows])
     start = X[int(np.argmin(objective.costs(longer, X, fit.noise)))]
-    beside = ls.fit(objective, longer, start, fit.noise, POLICY.usual)
-    return beside if beside.cost < fit.cost else None
+    return ls.fit(objective, longer, start, fit.noise, POLICY.usual)
