@@ -20,7 +20,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from gaident.checks import real_number
 from gaident.data.record import CHANNELS, Record
-from gaident.data.record_checks import at_its_lines
+from gaident.data.record_checks import at_its_lines, is_held
 from gaident.data.signals.arrays import MINIMUM_SAMPLES, channel, positive_number, sample_time
 from gaident.data.signals.decimation import low_passed
 from gaident.data.signals.lags import LagFit, coarse_lags, refine
@@ -306,13 +306,15 @@ def _result(
     start, stop = int(common[0]), int(common[-1]) + 1
     axis = their_dt * np.arange(len(next(iter(theirs.values()))))
     ratio = rec.dt / (their_dt * (1.0 + fit.rate))
-    new = {name: PchipInterpolator(axis, low_passed(theirs[name], ratio))(inner[start:stop]) for name in taken}
+    held = {"torque"} if isinstance(other, Record) and is_held(other.torque_is, other.torque_log) else set[str]()
+    passed = {name: low_passed(theirs[name], ratio, name in held) for name in taken}
+    new = {name: PchipInterpolator(axis, values)(inner[start:stop]) for name, values in passed.items()}
     channels: Mapping[str, Any] = {name: values[start:stop] for name, values in mine.items()} | new
     kind = other.torque_is if "torque" in taken and isinstance(other, Record) else None
     line = None
     if "torque" in taken:  # what was low-passed goes on between the lines
-        of_means = isinstance(other, Record) and other.torque_log == MEAN
-        line = SMOOTH if of_means or low_passed(theirs["torque"], ratio) is not theirs["torque"] else SAMPLE
+        logged = other.torque_log if isinstance(other, Record) else SAMPLE
+        line = SMOOTH if logged == MEAN or passed["torque"] is not theirs["torque"] else logged
     record = rec.with_channels(torque_is=kind, torque_log=line, **channels)
     far = max(abs(inner[start] - fit.centre), abs(inner[stop - 1] - fit.centre))
     uncertainty = 2.0 * float(np.hypot(fit.centre_std, far * fit.std[1]))

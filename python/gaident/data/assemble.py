@@ -16,6 +16,7 @@ from gaident.data.column_score import spoken_for
 from gaident.data.counters import Counters
 from gaident.data.formats.table import Column, LogTable
 from gaident.data.record import CHANNELS, Record
+from gaident.data.record_checks import is_held
 from gaident.data.signals.arrays import MINIMUM_SAMPLES
 from gaident.data.signals.conditioning import differentiate, low_pass
 from gaident.data.signals.decimation import Decimator, decimated, factor_of
@@ -57,10 +58,11 @@ def assemble(table: LogTable, wanted: Wanted, stem: str) -> Record:
     kind = _torque_kind(table, wanted, named.get("torque")) if ELECTRICAL.isdisjoint(named) else ""
     counters = Counters(table, wanted, named)
     said: list[str] = [*_unnamed_torque(table, wanted, named), *_known_by_name(kind, wanted)]
+    held = {"torque"} if is_held(kind, wanted.torque_log) else set[str]()
     if wanted.resample is not None:
-        dt, values = _on_even_axis(table, wanted, named, scales, counters)
+        dt, values = _on_even_axis(table, wanted, named, scales, counters, held)
     else:
-        dt, values = _block_by_block(table, wanted, named, scales, counters)
+        dt, values = _block_by_block(table, wanted, named, scales, counters, held)
     said += [*_slow_clock(table, wanted, named, dt), *_held_long(kind, wanted, named, dt)]
     said += dict.fromkeys(column.note for column in named.values() if column.note)
     try:
@@ -194,9 +196,9 @@ _Values = dict[str, NDArray[np.float64]]
 
 
 def _block_by_block(
-    table: LogTable, wanted: Wanted, named: dict[str, Column], scales: dict[str, float], counters: Counters
+    table: LogTable, wanted: Wanted, named: dict[str, Column], scales: dict[str, float], counters: Counters, held: set[str]
 ) -> tuple[float, _Values]:
-    """(dt [s], channel -> values in SI) of a log with one even time axis."""
+    """(dt [s], channel -> values in SI) of a log with one even time axis; held: channels that keep each value."""
     time = common_clock(table, wanted, named)
     keys = {channel: column for channel, column in named.items() if column is not time}
     columns = [*keys.values(), *([] if time is None else [time])]
@@ -211,7 +213,7 @@ def _block_by_block(
                 f"were logged at several rates, put them on one axis with {arg('resample')} [s]"
             )
     factor = factor_of(wanted.decimate)
-    decimators = {channel: Decimator(factor) for channel in named}
+    decimators = {channel: Decimator(factor, channel in held) for channel in named}
     axis: TimeAxis | None = None
     count = 0
     for block in table.blocks(list({column.key: column for column in columns}.values())):
@@ -240,9 +242,9 @@ def _stated(table: LogTable, named: Mapping[str, Column]) -> float:
 
 
 def _on_even_axis(
-    table: LogTable, wanted: Wanted, named: dict[str, Column], scales: dict[str, float], counters: Counters
+    table: LogTable, wanted: Wanted, named: dict[str, Column], scales: dict[str, float], counters: Counters, held: set[str]
 ) -> tuple[float, _Values]:
-    """(dt [s], channel -> values in SI), each channel interpolated from time stamps of its own."""
+    """(dt [s], channel -> values in SI), each channel interpolated from time stamps of its own; held: as above."""
     assert wanted.resample is not None
     clocks = {channel: clock_of(table, wanted, column) for channel, column in named.items()}
     parts: dict[str, list[tuple[NDArray[np.float64], NDArray[np.float64]]]] = {channel: [] for channel in named}
@@ -258,10 +260,10 @@ def _on_even_axis(
             first += len(values)
     whole = {channel: (np.concatenate([t for t, _ in p]), np.concatenate([x for _, x in p])) for channel, p in parts.items()}
     dt = float(wanted.resample)
-    even = resampled(table.path, whole, dt)
+    even = resampled(table.path, whole, dt, held)
     factor = factor_of(wanted.decimate)
     if factor > 1:
-        even = {channel: decimated(x, factor) for channel, x in even.items()}
+        even = {channel: decimated(x, factor, channel in held) for channel, x in even.items()}
     return dt * factor, even
 
 

@@ -283,7 +283,7 @@ class Record:
             Where the factor is no whole number >= 1, or fewer than 20 samples are left.
         """
         factor = factor_of(factor, "decimate", "({!r})")
-        kept: Mapping[str, Any] = decimated_channels(dict(self.channels()), factor, self.torque_log)
+        kept: Mapping[str, Any] = decimated_channels(dict(self.channels()), factor, self.torque_is, self.torque_log)
         return self.with_channels(dt=self.dt * factor, torque_log=SMOOTH if factor > 1 and "torque" in kept else None, **kept)
 
     def shifted(self, **samples: int) -> Record:

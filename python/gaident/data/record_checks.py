@@ -17,7 +17,7 @@ from gaident.checks import one_of
 from gaident.data.signals.arrays import MINIMUM_SAMPLES, channel, sample_time
 from gaident.data.signals.decimation import decimated
 from gaident.data.signals.wraps import continued, overflow, wrapped_words
-from gaident.data.torque_kind import COMMANDED, MEAN, SAMPLE, TORQUE_KINDS, TORQUE_LOGS
+from gaident.data.torque_kind import COMMANDED, HELD, MEAN, SAMPLE, TORQUE_KINDS, TORQUE_LOGS
 from gaident.errors import RecordError
 
 __all__ = [
@@ -27,6 +27,7 @@ __all__ = [
     "decimated_channels",
     "digest_of",
     "equally_long",
+    "is_held",
     "moved_channels",
     "saved_fields",
     "sample_at",
@@ -206,14 +207,20 @@ def still_driven(channels: Mapping[str, object], changed: Mapping[str, object]) 
 
 
 def decimated_channels(
-    channels: Mapping[str, NDArray[np.float64]], factor: int, torque_log: str
+    channels: Mapping[str, NDArray[np.float64]], factor: int, torque_is: str, torque_log: str
 ) -> dict[str, NDArray[np.float64]]:
     """Every `factor`-th sample behind a low-pass, see `Record.decimate`. Raises RecordError where too few are left."""
     count = -(-len(channels["velocity"]) // factor)
     if count < MINIMUM_SAMPLES:
         raise RecordError(f"decimate({factor}) leaves {count} samples, but at least {MINIMUM_SAMPLES} are needed")
     late = {"torque": at_its_lines(channels["torque"])} if torque_log == MEAN and factor > 1 else {}
-    return {key: decimated(values, factor) for key, values in (dict(channels) | late).items()}
+    held = {"torque"} if is_held(torque_is, torque_log) else {}
+    return {key: decimated(values, factor, key in held) for key, values in (dict(channels) | late).items()}
+
+
+def is_held(torque_is: str, torque_log: str) -> bool:
+    """Whether a torque jumps at each line and is held until the next: a commanded one, unless the record says another thing."""
+    return torque_log == HELD or (torque_log == SAMPLE and torque_is == COMMANDED)
 
 
 def at_its_lines(means: NDArray[np.float64]) -> NDArray[np.float64]:

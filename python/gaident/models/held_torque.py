@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gaident.data.record import Record
-from gaident.data.record_checks import at_its_lines
+from gaident.data.record_checks import at_its_lines, is_held
 from gaident.data.signals.decimation import means_ahead
 from gaident.data.torque_kind import COMMANDED, HELD, MEAN, MEASURED, SAMPLE, SMOOTH
 from gaident.policy.table import POLICY
@@ -26,8 +26,8 @@ def sampled_between(rec: Record) -> bool:
 
 
 def held_from_lines(rec: Record) -> bool:
-    """Whether the torque jumps at each line and is held until the next: a commanded one, unless the record says another thing."""
-    return rec.torque_log == HELD or (rec.torque_log == SAMPLE and rec.torque_is == COMMANDED)
+    """Whether the torque jumps at each line and is held until the next, see `is_held`."""
+    return is_held(rec.torque_is, rec.torque_log)
 
 
 def kind_of_held(rec: Record, dt: float) -> str:

@@ -35,6 +35,13 @@ class Decimator:
         y(k) = sum_j h(j) x(k M - j),   j = -L..L,   M = factor, L = 25 M
         h(j) = sinc(0.9 j / M) kaiser(j; beta = 8), normalised to a sum of 1
 
+    held: x is the torque that each sample holds until the next one, half a sample later than the value at its line.
+    Its taps are those of the spectrum
+
+        H_held(W) = H(W) jW/(e^jW - 1),   W = 2 pi f dt
+
+    so that of a rigid axis, J (v(n+1) - v(n)) = dt x(n), y is J dv/dt of what this low-pass makes of v.
+    Above its resonances every axis is rigid.
     Linear phase, and as the sum runs from -L to L its delay of L samples is compensated: y(k) belongs to the time of x(k M), and
     all channels keep their phase against each other.
     Up to 80 % of the new Nyquist frequency 1/(2 M dt) a signal passes to within 0.03 %, from that frequency on it is damped by 72
@@ -43,10 +50,10 @@ class Decimator:
     The filter is symmetric: an edge shows up to 25 new samples before it comes.
     """
 
-    def __init__(self, factor: int) -> None:
+    def __init__(self, factor: int, held: bool = False) -> None:
         self.factor = factor_of(factor)
         self.half = reach(self.factor)
-        self.taps = _taps(self.half, self.factor)
+        self.taps = _taps(self.half, self.factor, held)
         # Samples not yet done with; the first stands `half` before the next y, once the start was continued.
         self.kept = np.zeros(0)
         self.begun = self.half == 0
@@ -85,11 +92,14 @@ class Decimator:
 
 
 @lru_cache(maxsize=16)
-def _taps(half: int, ratio: float) -> NDArray[np.float64]:
+def _taps(half: int, ratio: float, held: bool = False) -> NDArray[np.float64]:
     """h(-half..half), normalised; not to be written to."""
     j = np.arange(-half, half + 1)
     taps = np.sinc(_CORNER * j / ratio) * np.kaiser(2 * half + 1, _KAISER)
     taps /= taps.sum()
+    if held and half:
+        W = 2.0 * np.pi * np.arange(1, half + 1) / len(taps)
+        taps = np.fft.irfft(np.fft.rfft(taps) * np.append(1.0, 1j * W / np.expm1(1j * W)), len(taps))
     taps.flags.writeable = False
     return np.asarray(taps)
 
@@ -99,19 +109,19 @@ def reach(factor: int) -> int:
     return _HALF * factor if factor > 1 else 0
 
 
-def low_passed(x: NDArray[np.float64], ratio: float) -> NDArray[np.float64]:
+def low_passed(x: NDArray[np.float64], ratio: float, held: bool = False) -> NDArray[np.float64]:
     """x behind the same low-pass, not decimated, for a sample rate `ratio` times as slow; x itself up to 1.05."""
     if ratio <= 1.05:  # no decision: a low-pass with its corner at the Nyquist frequency does nothing
         return x
     from scipy.signal import oaconvolve
 
     half = int(np.ceil(_HALF * ratio))
-    return np.asarray(oaconvolve(np.pad(x, half, "reflect", reflect_type="odd"), _taps(half, ratio), "valid"))
+    return np.asarray(oaconvolve(np.pad(x, half, "reflect", reflect_type="odd"), _taps(half, ratio, held), "valid"))
 
 
-def decimated(x: NDArray[np.float64], factor: int) -> NDArray[np.float64]:
+def decimated(x: NDArray[np.float64], factor: int, held: bool = False) -> NDArray[np.float64]:
     """All of x at once, see Decimator."""
-    decimator = Decimator(factor)
+    decimator = Decimator(factor, held)
     decimator.push(x)
     return decimator.finish()
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,15 +15,19 @@ __all__ = ["resampled"]
 
 
 def resampled(
-    path: str, channels: Mapping[str, tuple[NDArray[np.float64], NDArray[np.float64]]], dt: float
+    path: str, channels: Mapping[str, tuple[NDArray[np.float64], NDArray[np.float64]]], dt: float, held: Collection[str] = ()
 ) -> dict[str, NDArray[np.float64]]:
     """Each channel by linear interpolation at t0 + n dt, t0 to t1 being what all channels cover.
+
+        x_held(n) = (1/dt) (integral of x from t0 + n dt to t0 + (n + 1) dt)    x keeps each value until the next time stamp
 
     channels  name -> (time stamps [s], values), shape (n,) each, n may differ; the stamps increase, those without a
               value (NaN) are left out, and no gap between them may be longer than five of their usual steps in the time
               that all cover
     dt        sample time of the result [s]; at most 1.5 times what the channels have, or high frequencies would alias;
               at least a hundredth of the finest
+    held      names of channels that keep each value until the next one, unless another channel was logged faster: then there are
+              values between those that were logged; the mean over a line of the result is held over it
 
     Linear interpolation is a low-pass of its own (sinc^2 on average: -1.8 dB at a quarter of the log's sample rate) without
     delay. Raises ReadError.
@@ -60,7 +64,18 @@ def resampled(
     for name, (t, _) in logged.items():
         _refuse_gaps(path, name, t, start, stop)
     axis = start + dt * np.arange(int(np.floor((stop - start) / dt + 1e-6)) + 1)
-    return {name: np.interp(axis, t, x) for name, (t, x) in logged.items()}
+    fast = POLICY.resample_coarser * finest
+    kept = {name for name, (t, _) in logged.items() if name in held and float(np.median(np.diff(t))) <= fast}
+    return {name: (_means if name in kept else np.interp)(axis, t, x) for name, (t, x) in logged.items()}
+
+
+def _means(axis: NDArray[np.float64], t: NDArray[np.float64], x: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Of a signal that is x from each t on, the mean over each line of an even axis."""
+    line = axis[1] - axis[0]
+    ends = np.append(axis, axis[-1] + line)
+    last = max(t[-1], ends[-1]) + line  # its last value is held to the end
+    area = np.append(0.0, np.cumsum(x * np.diff(t, append=last)))
+    return np.asarray(np.diff(np.interp(ends, np.append(t, last), area)) / line)
 
 
 def _refuse_gaps(path: str, name: str, t: NDArray[np.float64], start: float, stop: float) -> None:
