@@ -76,6 +76,10 @@ class Predictor(Protocol):
         """Velocity of the linear part of the model x, from rest, under rows of torque held over each sample."""
         ...
 
+    def sensor_response(self, parameters: Parameterisation, x: Vector, errors: Matrix) -> Matrix:
+        """What rows of an error of the sensor add to the velocity that it shows, with the linear part of the model x."""
+        ...
+
 
 @dataclass(frozen=True)
 class OpenLoop:
@@ -121,6 +125,10 @@ class OpenLoop:
         d = parameters.linear(x).discrete(parameters.scales.dt)
         return filtered(d.alpha, np.append(1.0, -d.beta), torques, self.data.lengths)
 
+    def sensor_response(self, parameters: Parameterisation, x: Vector, errors: Matrix) -> Matrix:
+        """See `Predictor`; the logged torque contains the controller's answer."""
+        return errors
+
 
 @dataclass(frozen=True)
 class ClosedLoop:
@@ -149,17 +157,19 @@ class ClosedLoop:
         )
 
     def torque_response(self, parameters: Parameterisation, x: Vector, torques: Matrix) -> Matrix:
-        """See `Predictor`; the controller answers: G d - T (G d), T the closed loop's response to the command.
+        """See `Predictor`; the controller answers to what the torque makes of the velocity."""
+        return self.sensor_response(parameters, x, OpenLoop(self.data).torque_response(parameters, x, torques))
+
+    def sensor_response(self, parameters: Parameterisation, x: Vector, errors: Matrix) -> Matrix:
+        """See `Predictor`; the controller answers: e - T e, T the closed loop's response to the command.
 
         Of a cascade that is taken to be its velocity controller alone, at the log's rate.
         """
-        linear = parameters.linear(x)
-        open_loop = OpenLoop(self.data).torque_response(parameters, x, torques)
         loop = self.data.loop
         assert loop is not None
         pi = self.data.pi or PI(kp=loop.gains.kp, ki=loop.gains.ki)
-        d = linear.discrete(parameters.scales.dt, pi)
-        return open_loop - filtered(d.alpha, np.append(1.0, -d.beta), open_loop, self.data.lengths)
+        d = parameters.linear(x).discrete(parameters.scales.dt, pi)
+        return errors - filtered(d.alpha, np.append(1.0, -d.beta), errors, self.data.lengths)
 
 
 @dataclass(frozen=True)
@@ -185,6 +195,10 @@ class ObserverLoop:
     def torque_response(self, parameters: Parameterisation, x: Vector, torques: Matrix) -> Matrix:
         """See `Predictor`."""
         return self._loop(parameters).torque_response(parameters, x, torques)
+
+    def sensor_response(self, parameters: Parameterisation, x: Vector, errors: Matrix) -> Matrix:
+        """See `Predictor`."""
+        return self._loop(parameters).sensor_response(parameters, x, errors)
 
     @staticmethod
     def possible(data: DataSet) -> bool:

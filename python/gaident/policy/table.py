@@ -160,6 +160,7 @@ class Decisions:
     least_functions: int = noise(4, "1", "functions of a driver's family at least, for which any record has room", SHORT)
     function_knots: int = noise(8, "1", "knots of a free function of torque or command, at quantiles", DRIVES)
     angle_knots: int = noise(6, "1", "the same of the angle, beside which harmonics of a turn stand", DRIVES)
+    time_knots: int = noise(7, "1", "the same of time, for dry friction that changes in the course of a record", DRIVES)
     slow_knot: float = noise(
         0.01,
         "1",

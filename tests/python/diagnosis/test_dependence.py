@@ -2,21 +2,25 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
 import gaident as ga
-from gaident.diagnosis.selection.dependence import Dependence, _strongest, dependence
+from gaident.diagnosis.library.terms import LIBRARY
+from gaident.diagnosis.selection.dependence import Dependence, _drifts, _strongest, dependence
+from gaident.estimation import least_squares as ls
 from gaident.estimation.dataset import DataSet
 from gaident.estimation.noise_model import WHITE
-from gaident.estimation.objective import Hypothesis, Objective, OutputErrors
+from gaident.estimation.objective import Hypothesis, Innovations, Objective, OutputErrors
 from gaident.estimation.parameterisation import Parameterisation
 from gaident.estimation.prediction import OpenLoop
 from gaident.estimation.prefilter import Prefilter
 from gaident.estimation.projection import project_out
 from gaident.estimation.term import Scales
+from gaident.policy.table import POLICY
 
 RNG = np.random.default_rng(0)
 
@@ -73,3 +77,64 @@ def test_a_driver_takes_away_a_share_of_the_error_whatever_its_gain() -> None:
     assert replace(left, unwhitened={"position": 0.98, "time": 0.9999}).driver == "position"
     hum = replace(left, gains={"position": 10.0, "time": 100.0}, line=(50.0, 0.01))
     assert hum.driver == "time" and replace(hum, line=None).driver is None
+
+
+def left_beside(u: np.ndarray, velocity: np.ndarray, dt: float, start: Mapping[str, Sequence[float]] = {}) -> Dependence:
+    """What the errors of an axis with J = 0.01 and D = 0.02, fitted with these effects from these starts, depend on."""
+    rec = ga.Record(dt, velocity=velocity, torque=u)
+    axis, data = ga.OneMass(J=0.01, D=0.02).model(), DataSet.of([rec], None)
+    scales = Scales(dt, rec.duration, 50.0, 1.0, 1.0, 10.0, 0.02, float("nan"), float("nan"), False, 1.0)
+    parameters = Parameterisation.of(axis, scales, [False])
+    x = parameters.start(axis)
+    for name, z in start.items():
+        parameters, x = parameters.extended(LIBRARY[name]), parameters.inserted(x, np.array(z))
+    objective = Objective(data, np.ones(len(u)), Innovations())
+    return dependence(objective, ls.fit(objective, Hypothesis(parameters, OpenLoop(data)), x, WHITE, POLICY.usual))
+
+
+def driven(n: int = 4000) -> np.ndarray:
+    """A torque of levels in both directions [N m]."""
+    return np.repeat(np.random.default_rng(3).uniform(-0.6, 0.6, n // 100), 100)
+
+
+def rolled(dt: float, torque: Callable[[int, float, float], float], n: int = 4000) -> np.ndarray:
+    """The velocity of that axis under torque(line, velocity, angle), ten Euler steps a line, with noise of 0.02 rad/s."""
+    w = angle = 0.0
+    found = np.empty(n)
+    for i in range(n):
+        found[i] = w
+        for _ in range(10):
+            w, angle = w + 0.1 * dt * (torque(i, w, angle) - 0.02 * w) / 0.01, angle + 0.1 * dt * w
+    return found + 0.02 * np.random.default_rng(4).standard_normal(n)
+
+
+def test_a_torque_constant_that_falls_depends_on_the_time_and_not_on_the_torque() -> None:
+    u, dt = driven(), 1e-3
+    left = left_beside(u, rolled(dt, lambda i, w, _: u[i] * (1.0 - 0.2 * (1.0 - np.exp(-i / 1500.0)))), dt)
+    assert left.driver == "time" and left.gains["time"] > 2.0 * left.gains["torque"], left.gains
+
+
+def test_what_changes_in_time_is_in_one_of_the_families_of_the_time() -> None:
+    """Friction that goes up, down and up again is no line or parabola; a winding that gets warm is nearly a parabola."""
+    t, u = np.arange(4000) / 1000.0, driven()
+    w = np.random.default_rng(8).standard_normal(4000)
+    load, friction, constant = _drifts(t, w, u)
+    walking, warming = np.sin(2.0 * np.pi * t / 3.0) * np.sign(w), u * (1.0 - np.exp(-t / 1.5))
+
+    def left_of(x: np.ndarray, rows: np.ndarray) -> float:
+        return float(np.std(project_out(rows, x[None, :])) / np.std(x))
+
+    assert left_of(walking, friction) < 0.15 and left_of(walking, np.vstack([load, constant])) > 0.9
+    assert left_of(warming, constant) < 0.1 and left_of(warming, np.vstack([load, friction])) > 0.9
+    assert left_of((0.3 - 0.1 * t) * w, np.vstack([w, friction])) < 1e-9, "damping that falls with the temperature"
+
+
+def test_a_ripple_that_grows_with_the_speed_is_left_beside_one_that_does_not() -> None:
+    """The sensor shows w + 1e-3 w abs(w) cos(3 theta); a ripple of order 3 explains it at one speed only."""
+    u, dt = driven(), 1e-3
+    w, ripple = rolled(dt, lambda i, w, _: u[i]), {"velocity_ripple": (0.01, 0.0, 3.0)}
+    angle = dt * np.append(0.0, np.cumsum(0.5 * (w[1:] + w[:-1])))
+    left = left_beside(u, w + 1e-3 * w * np.abs(w) * np.cos(3.0 * angle), dt, ripple)
+    assert left.driver == "position", left.gains
+    held = left_beside(u, w + 0.02 * w * np.cos(3.0 * angle), dt, ripple)
+    assert held.driver is None, held.gains

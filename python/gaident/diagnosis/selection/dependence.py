@@ -1,13 +1,16 @@
 """Unexplained dependence: what the error still depends on, named by its driver and never by a cause.
 
-Each driver is a family of torques that span the functions of it: piecewise linear ones of velocity, torque and position,
-harmonics of the angle, elasto-plastic elements (what depends on the past path), drifts and single frequencies in time.
+Each driver is one family, or several, of torques that span the functions of it: piecewise linear ones of velocity, torque and
+position, harmonics of the angle, elasto-plastic elements (what depends on the past path), single frequencies in time.
+A load, dry friction and a torque constant that change in time are a family each; so is a wave of the angle of an order that the
+model contains, at the shaft or of the sensor, whose size changes with the speed: no effect of the library has that law.
 The linear part of the model answers to each; what the answers explain of the whitened error, beyond what the model's own
-parameters could, is the driver's gain in BIC units. All share one noise filter, estimated on what all together leave.
+parameters could, is the gain in BIC units; the best family's is the driver's.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -79,10 +82,14 @@ def dependence(objective: Objective, fit: Fit) -> Dependence:
     """
     data = objective.data
     J, error = objective.sensitivities(fit.hypothesis, fit.x)
-    columns = _columns(objective, fit, error)
+    families = _families(objective, fit, error)
     account = _Account(objective, J, error, fit)
     none = account.bic(np.zeros((0, len(error))))
-    gains = {driver: none - account.bic(rows) for driver, rows in columns.items()}
+    gains, columns = {}, {}
+    for driver, rows in families.items():
+        bics = [account.bic(family) for family in rows]
+        best = int(np.argmin(bics))
+        gains[driver], columns[driver] = none - bics[best], rows[best]
     line = None
     for _, pairs in lines(project_out(J, error[None, :])[0], data.lengths):
         # A frequency that was searched for counts as a number more.
@@ -99,31 +106,33 @@ def dependence(objective: Objective, fit: Fit) -> Dependence:
 
 
 def families(objective: Objective, fit: Fit) -> dict[str, Matrix]:
-    """Driver -> rows that span what a free function of it does to the error, before all filters."""
-    return _columns(objective, fit, objective.error(fit))
+    """Driver -> rows that span what its free functions do to the error, before all filters."""
+    return {driver: np.vstack(rows) for driver, rows in _families(objective, fit, objective.error(fit)).items()}
 
 
-def _columns(objective: Objective, fit: Fit, error: Vector) -> dict[str, Matrix]:
+def _families(objective: Objective, fit: Fit, error: Vector) -> dict[str, list[Matrix]]:
     data, parameters, x = objective.data, fit.parameters, fit.x
     w = objective.measured - error
     # Numbers for a family; from 290 samples on there is room for all.
     room = max(len(w) // POLICY.function_samples, POLICY.least_functions)
-    torques: dict[str, Matrix] = {
-        "velocity": _hats_by_sign(w),
-        "position": _of_position(data.angle, w),
-        "torque": _hats(data.torque, POLICY.function_knots),
-        "past": _of_path(data.angle, data.lengths),
-        "time": _drifts(data.time, w),
+    torques: dict[str, list[Matrix]] = {
+        "velocity": [_hats_by_sign(w)],
+        "position": [_of_position(data.angle, w)],
+        "torque": [_hats(data.torque, POLICY.function_knots)],
+        "past": [_of_path(data.angle, data.lengths)],
+        "time": _drifts(data.time, w, data.torque),
     }
     if data.command is not None:
-        torques["command"] = _hats(data.command, POLICY.function_knots)
-    response = fit.predictor.torque_response
-    columns = {d: response(parameters, x, rows) for d, rows in torques.items()}
+        torques["command"] = [_hats(data.command, POLICY.function_knots)]
+    response, shown = fit.predictor.torque_response, fit.predictor.sensor_response
+    found = {driver: [response(parameters, x, rows) for rows in of] for driver, of in torques.items()}
+    if orders := _orders(fit):
+        shaft, sensor = _waves(orders, data.angle, w)
+        found["position"].append(np.vstack([response(parameters, x, shaft), shown(parameters, x, sensor)]))
     if parameters.masses == 2:
-        columns["past"] = np.vstack(
-            [columns["past"], coupling_response(data, parameters, x, _of_path(twist(data, parameters, x), data.lengths))]
-        )
-    return {d: _strongest(rows, room) for d, rows in columns.items()}
+        of_twist = coupling_response(data, parameters, x, _of_path(twist(data, parameters, x), data.lengths))
+        found["past"] = [np.vstack([*found["past"], of_twist])]
+    return {driver: [_strongest(rows, room) for rows in of] for driver, of in found.items()}
 
 
 def beside_torque_noise(objective: Objective, fit: Fit) -> Dependence:
@@ -225,9 +234,24 @@ def _of_path(angle: Vector, lengths: tuple[int, ...]) -> Matrix:
     return rows / widths[:, None]
 
 
-def _drifts(t: Vector, w: Vector) -> Matrix:
+def _drifts(t: Vector, w: Vector, u: Vector) -> list[Matrix]:
+    """What changes in the course of a record: a load, friction, a torque constant."""
     s = t / (float(t.max()) or 1.0)
-    return np.array([s, s * s, s * np.sign(w), s * w])
+    dry = _hats(s, POLICY.time_knots)[1:] * np.sign(w)
+    return [np.array([s, s * s]), np.vstack([dry, s * w]), np.array([s * u, s * s * u])]
+
+
+def _orders(fit: Fit) -> list[float]:
+    """The orders of the angle that the model contains."""
+    terms = [t for t in fit.parameters.terms if t.harmonic]
+    return [float(fit.x[fit.parameters.slot(t.name)][-1]) if t.chooses_order else 1.0 for t in terms]
+
+
+def _waves(orders: Sequence[float], angle: Vector, w: Vector) -> tuple[Matrix, Matrix]:
+    """(torques at the shaft (6 n, samples), errors of the sensor (4 n, samples)) of n orders; speeds in parts of the largest."""
+    speed = np.abs(w) / (float(np.abs(w).max()) or 1.0)
+    pairs = np.vstack([f(order * angle) for order in orders for f in (np.sin, np.cos)])
+    return np.vstack([pairs, pairs * speed, pairs * speed**2]), np.vstack([pairs * w, pairs * w * speed])
 
 
 def _torque_of_line(objective: Objective, fit: Fit, jacobian: Matrix, error: Vector, pairs: Matrix) -> tuple[float, float] | None:
