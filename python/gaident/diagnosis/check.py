@@ -102,10 +102,10 @@ def checked(data: DataSet, gains: Gains, model: Model, mechanics: Mapping[str, E
     rows = _compared(_said(found, records, _has_friction(effects)), mechanics, effects)
     asked = any(_surely(c, c.diagnosis) for c in rows)
     own = _of_own_records(found, model, records, _has_friction(effects)) if asked else {}
-    ahead, torque = bool(effects_before_the_shaft(model)), after.torque_rms or 0.0
+    ahead, torque, reach = bool(effects_before_the_shaft(model)), after.torque_rms or 0.0, 0.5 * float(np.ptp(data.angle))
     rows = [replace(c, of_model=own.get(c.name)) for c in rows]
     comparable = [c.of_model is not None or not ahead for c in rows]  # the regression knows no effect ahead of the shaft
-    comparisons = tuple(replace(c, differs=b and _contradicts(c, torque)) for b, c in zip(comparable, rows, strict=True))
+    comparisons = tuple(replace(c, differs=b and _contradicts(c, torque, reach)) for b, c in zip(comparable, rows, strict=True))
     verdict = _verdict(after.force_error, second)
     notes = tuple(_sentence(c) for c in comparisons if c.differs)
     lost = _lost(after, second, better)
@@ -212,14 +212,13 @@ def _surely(c: Comparison, of_model: Estimate) -> bool:
     return abs(c.regression.value - of_model.value) > POLICY.check_deviations * math.hypot(c.diagnosis.std, c.regression.std)
 
 
-def _contradicts(c: Comparison, torque: float) -> bool:
-    """Whether the two contradict each other; torque: its rms [N m]."""
+def _contradicts(c: Comparison, torque: float, reach: float) -> bool:
+    """Whether the two contradict each other; torque: its rms [N m]; reach: half the travel [rad], to which a spring is turned."""
+    in_torque = {"N m": 1.0, "N m/rad": reach}.get(NONE[c.name], math.inf)  # an inertia counts whatever it accelerates
 
     def apart(of_model: Estimate) -> bool:
         a, b = of_model.value, c.regression.value
-        matters = abs(a - b) > POLICY.check_share * max(abs(a), abs(b)) and (
-            NONE[c.name] != "N m" or abs(a - b) > POLICY.check_torque * torque
-        )
+        matters = abs(a - b) > POLICY.check_share * max(abs(a), abs(b)) and abs(a - b) * in_torque > POLICY.check_torque * torque
         return matters and _surely(c, of_model)
 
     # What the regression did not find it cannot say of the model's records either: it has no term for it there.
@@ -335,11 +334,12 @@ def _deviations(c: Comparison) -> float:
 def _smaller_sentence(c: Comparison, own: Estimate) -> Text:
     mine, other = _both(c)
     text = (
-        "{}, the inverse-dynamics regression of the same records {}: {:.2g} % apart, {:.3g} times both deviations together. Of "
+        "{}, the inverse-dynamics regression of the same records {}: {}{:.3g} times both deviations together. Of "
         "records that the model itself made it says {:.3g} {}, so that its filter is not the reason."
     )
     share = 100.0 * abs(c.diagnosis.value - c.regression.value) / max(abs(c.diagnosis.value), abs(c.regression.value))
-    return say(text, mine.begun(), other, share, _deviations(c), own.value, unit_text(own.unit))
+    apart = Text("") if c.diagnosis.value == 0.0 or c.regression.value == 0.0 else say("{:.2g} % apart, ", share)
+    return say(text, mine.begun(), other, apart, _deviations(c), own.value, unit_text(own.unit))
 
 
 def _both(c: Comparison) -> tuple[Text, Text]:

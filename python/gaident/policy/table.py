@@ -201,7 +201,10 @@ class Decisions:
     )
     check_share: float = check(0.1, "1", "part of the larger value: a smaller difference does not matter", DRIVES)
     check_torque: float = check(
-        0.05, "1", "of the torque's rms: a smaller difference of friction, gravity or force errors does not matter", REAL
+        0.05,
+        "1",
+        "of the torque's rms: a smaller difference of friction, gravity, a spring at half the travel, force errors is immaterial",
+        REAL,
     )
     velocity_part: float = check(
         0.95,

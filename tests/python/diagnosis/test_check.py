@@ -12,11 +12,12 @@ import pytest
 import gaident as ga
 from drive_rig import Plant, rig, skip_without_library
 from gaident.axis import said
-from gaident.diagnosis.check import Check, _of_the_filter, checked
+from gaident.diagnosis.check import Check, _contradicts, _of_the_filter, _smaller_sentence, checked
 from gaident.diagnosis.gains import Gains
 from gaident.estimation.dataset import DataSet
 from gaident.estimation.regression.force_error import FilteredRecords
 from gaident.results.diagnosis import Fitness
+from gaident.results.fitness import Comparison
 
 skip_without_library()
 
@@ -173,6 +174,17 @@ def test_a_small_difference_is_said_where_the_regression_of_a_right_model_has_it
     assert said(note, "linear").startswith("The mass of the diagnosis is 0.000309 +- 6.2e-07 kg, ")
     behind = check_of(rec, inertia=3.09e-4, share=2e-3, coulomb_friction=FRICTION, torque_dead_band={"width": 1e-4})
     assert behind.notes == ()
+
+
+def test_a_spring_matters_by_the_torque_that_it_makes_over_the_travel() -> None:
+    """As friction and gravity do: 5 % of the torque's rms, whatever the stiffness is in N m/rad."""
+    none, found = ga.Estimate(0.0, 0.0, "N m/rad"), ga.Estimate(3.55, 0.1, "N m/rad")
+    spring = Comparison("ground stiffness", none, found, False)
+    assert not _contradicts(spring, 50.0, 0.123) and _contradicts(spring, 50.0, 1.23)
+    load = Comparison("gravity", ga.Estimate(0.0, 0.0, "N m"), ga.Estimate(3.55, 0.1, "N m"), False)
+    assert _contradicts(load, 50.0, 0.0) and not _contradicts(load, 100.0, 10.0)
+    note = _smaller_sentence(spring, ga.Estimate(0.5, 0.1, "N m/rad"))
+    assert "has no ground stiffness" in note and "35.5 times both deviations" in note and "% apart" not in note
 
 
 def test_friction_that_falls_with_the_speed_is_no_contradiction() -> None:

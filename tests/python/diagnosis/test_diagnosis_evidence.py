@@ -326,6 +326,15 @@ def test_little_travel_no_loop_and_no_motion() -> None:
         excitation([])
 
 
+def test_an_axis_whose_reversals_fall_between_the_lines_reverses() -> None:
+    """Fast ramps through zero: no line is as slow as the noise, and in a slow log no line ever is."""
+    w = 10.0 * np.sign(np.sin(0.1 * np.arange(400) + 0.05)) * (1.0 + 0.01 * np.sin(np.arange(400)))
+    found = excitation(ga.Record(1e-2, velocity=w, torque=np.gradient(w)))
+    assert not {"presliding_friction", "lugre_friction"} & set(found.not_testable)
+    ahead = excitation(ga.Record(1e-2, velocity=np.abs(w), torque=np.gradient(w)))
+    assert ahead.not_testable["presliding_friction"].startswith("the axis neither stands nor reverses")
+
+
 def test_what_one_record_lacks_another_may_bring() -> None:
     forwards = drive()[100:200]
     assert "asymmetric_friction" in excitation(forwards, CONTROLLER).not_testable

@@ -159,7 +159,8 @@ def creeps(s: Motions) -> Text | None:
 
 def stands_or_reverses(s: Motions) -> Text | None:
     """It stands still, or reverses."""
-    if s.slowest > max(m.velocity_floor for m in s.records):
+    reverses = any(np.any(m.moving & (m.smooth > 0.0)) and np.any(m.moving & (m.smooth < 0.0)) for m in s.records)
+    if not reverses and s.slowest > max(m.velocity_floor for m in s.records):
         return say("the axis neither stands nor reverses (slowest {:.3g} {rad/s})", s.slowest)
     return None
 
