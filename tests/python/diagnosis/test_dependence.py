@@ -126,6 +126,7 @@ def test_what_changes_in_time_is_in_one_of_the_families_of_the_time() -> None:
 
     assert left_of(walking, friction) < 0.15 and left_of(walking, np.vstack([load, constant])) > 0.9
     assert left_of(warming, constant) < 0.1 and left_of(warming, np.vstack([load, friction])) > 0.9
+    assert len(_drifts(t, w, None)) == 2, "of a measured torque a function contains its noise"
     assert left_of((0.3 - 0.1 * t) * w, np.vstack([w, friction])) < 1e-9, "damping that falls with the temperature"
 
 

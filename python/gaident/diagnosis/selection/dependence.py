@@ -120,7 +120,7 @@ def _families(objective: Objective, fit: Fit, error: Vector) -> dict[str, list[M
         "position": [_of_position(data.angle, w)],
         "torque": [_hats(data.torque, POLICY.function_knots)],
         "past": [_of_path(data.angle, data.lengths)],
-        "time": _drifts(data.time, w, data.torque),
+        "time": _drifts(data.time, w, None if data.torque_measured else data.torque),
     }
     if data.command is not None:
         torques["command"] = [_hats(data.command, POLICY.function_knots)]
@@ -234,11 +234,12 @@ def _of_path(angle: Vector, lengths: tuple[int, ...]) -> Matrix:
     return rows / widths[:, None]
 
 
-def _drifts(t: Vector, w: Vector, u: Vector) -> list[Matrix]:
-    """What changes in the course of a record: a load, friction, a torque constant."""
+def _drifts(t: Vector, w: Vector, u: Vector | None) -> list[Matrix]:
+    """What changes in the course of a record: a load, friction, a torque constant; u None: the torque contains noise."""
     s = t / (float(t.max()) or 1.0)
     dry = _hats(s, POLICY.time_knots)[1:] * np.sign(w)
-    return [np.array([s, s * s]), np.vstack([dry, s * w]), np.array([s * u, s * s * u])]
+    families = [np.array([s, s * s]), np.vstack([dry, s * w])]
+    return families if u is None else [*families, np.array([s * u, s * s * u])]
 
 
 def _orders(fit: Fit) -> list[float]:
