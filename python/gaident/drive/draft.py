@@ -180,7 +180,7 @@ class _Draft:
                         f"# {name} = {value}", name, f"{said(meaning, self.axis)}; the {which} is logged in {self.units[which]}"
                     )
                 )
-        if "torque" in self.guess.channels:
+        if "torque" in self.guess.channels or self._asked("torque", "command"):
             kinds = '"commanded": by the controller; "measured": a current times a constant'
             if self.torque_is is not None:
                 lines.append(line_of(f"torque_is = {quoted(self.torque_is)}", f"as its column's name says; {kinds}"))
@@ -252,9 +252,8 @@ class _Draft:
             if channel not in self.guess.channels:
                 either = self._either(channel)
                 told = f"{text}: {either}" if either else f"{text}{others}"
-                needed = bool(either) or (other not in self.guess.channels and not self._placed)
                 line = f'# {channel} = "..."'
-                lines.append(self._todo(line, channel, told) if needed else line_of(line, told))
+                lines.append(self._todo(line, channel, told) if self._asked(channel, other) else line_of(line, told))
         if self.axis == "rotary" and needed_constant("torque", self.units.get("torque") or "") == "torque_constant":
             supplies = [c.name for c in self.listing.columns if c.name in rest and factor_of("voltage", c.unit) is not None]
             if supplies:
@@ -264,6 +263,11 @@ class _Draft:
             if channel not in self.guess.channels and (either := self._either(channel)):
                 lines.append(line_of(f'# {channel} = "..."', either))
         return lines
+
+    def _asked(self, channel: str, other: str) -> bool:
+        """Whether a channel that is not found is asked for: some columns may be it, or neither it nor the other one is there."""
+        found = self.guess.channels
+        return channel not in found and (bool(self._either(channel)) or (other not in found and not self._placed))
 
     @property
     def _placed(self) -> bool:

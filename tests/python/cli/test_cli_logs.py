@@ -223,7 +223,7 @@ def test_init_finds_motion_by_its_values(here: Path, data_dir: Path, capsys: pyt
     assert main(["init", str(path), "--json"]) == 0
     found = json.loads(capsys.readouterr().out)
     assert found["channels"] == {"position": "data[:,2]", "velocity": "data[:,3]"}
-    assert [line.split(":")[0] for line in found["fill_in"][:2]] == ["command", "torque"]
+    assert [line.split(":")[0] for line in found["fill_in"][:3]] == ["torque_is", "command", "torque"]
     assert read_drive_file("drive.toml")["columns"]["time"] == "data[:,0]"
 
 
