@@ -318,3 +318,19 @@ def test_a_mean_from_another_log_is_put_at_its_lines() -> None:
     assert joined.torque is not None and joined.torque_log == "smooth"
     assert np.abs(joined.torque - joined.velocity)[30:-30].max() < 2e-3, "half a line of the other log would make 4e-3"
     assert rec.decimate(1).torque_log == "sample" and other.decimate(1) == other
+
+
+def test_means_over_lines_do_not_depend_on_where_the_time_begins(tmp_path: Path) -> None:
+    """Seconds since 1970 resolve 2.4e-7 s; a log of two lines is refused as too short."""
+    whole, _, _ = axis_under_steps(1e-4, 10)
+    for first in (0.0, 1.7e9):
+        rows = np.column_stack([whole.time + first, whole.velocity, whole.torque])[:6000]
+        np.savetxt(tmp_path / "log.csv", rows, delimiter=",", header="t [s],w [rad/s],u [Nm]", comments="", fmt="%.7f")
+        rec = ga.read(tmp_path / "log.csv", columns={"time": "t [s]", "velocity": "w [rad/s]", "torque": "u [Nm]"}, resample=1e-4)
+        assert rec.torque is not None
+        n = min(len(rec), 5990)
+        same = np.polyfit(rows[:n, 2], rec.torque[:n], 1)[0]
+        assert same == pytest.approx(1.0, abs=1e-3 if first else 1e-6)
+    np.savetxt(tmp_path / "two.csv", rows[:2], delimiter=",", header="t [s],w [rad/s],u [Nm]", comments="", fmt="%.7f")
+    with pytest.raises(RecordError, match="at least 20"):
+        ga.read(tmp_path / "two.csv", columns={"time": "t [s]", "velocity": "w [rad/s]", "torque": "u [Nm]"}, resample=1.4e-4)

@@ -66,16 +66,17 @@ def resampled(
     axis = start + dt * np.arange(int(np.floor((stop - start) / dt + 1e-6)) + 1)
     fast = POLICY.resample_coarser * finest
     kept = {name for name, (t, _) in logged.items() if name in held and float(np.median(np.diff(t))) <= fast}
-    return {name: (_means if name in kept else np.interp)(axis, t, x) for name, (t, x) in logged.items()}
+    return {
+        name: _means(len(axis), dt, t - start, x) if name in kept else np.interp(axis, t, x) for name, (t, x) in logged.items()
+    }
 
 
-def _means(axis: NDArray[np.float64], t: NDArray[np.float64], x: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Of a signal that is x from each t on, the mean over each line of an even axis."""
-    line = axis[1] - axis[0]
-    ends = np.append(axis, axis[-1] + line)
-    last = max(t[-1], ends[-1]) + line  # its last value is held to the end
+def _means(count: int, dt: float, t: NDArray[np.float64], x: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Of a signal that is x from each t on, t from the first line, the mean over each line of an even axis."""
+    ends = dt * np.arange(count + 1)
+    last = max(t[-1], ends[-1]) + dt  # its last value is held to the end
     area = np.append(0.0, np.cumsum(x * np.diff(t, append=last)))
-    return np.asarray(np.diff(np.interp(ends, np.append(t, last), area)) / line)
+    return np.asarray(np.diff(np.interp(ends, np.append(t, last), area)) / dt)
 
 
 def _refuse_gaps(path: str, name: str, t: NDArray[np.float64], start: float, stop: float) -> None:
