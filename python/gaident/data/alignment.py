@@ -24,6 +24,7 @@ from gaident.data.record_checks import at_its_lines, is_held
 from gaident.data.signals.arrays import MINIMUM_SAMPLES, channel, positive_number, sample_time
 from gaident.data.signals.decimation import low_passed
 from gaident.data.signals.lags import LagFit, coarse_lags, refine
+from gaident.data.signals.resampling import held_means
 from gaident.data.torque_kind import MEAN, SAMPLE, SMOOTH
 from gaident.errors import RecordError
 from gaident.estimation.criterion import gained
@@ -304,11 +305,15 @@ def _result(
     if common.size < MINIMUM_SAMPLES:
         raise RecordError(f"the logs have {common.size} samples in common, but at least {MINIMUM_SAMPLES} are needed")
     start, stop = int(common[0]), int(common[-1]) + 1
-    axis = their_dt * np.arange(len(next(iter(theirs.values()))))
+    axis: NDArray[np.float64] = their_dt * np.arange(float(len(next(iter(theirs.values())))))
     ratio = rec.dt / (their_dt * (1.0 + fit.rate))
     held = {"torque"} if isinstance(other, Record) and is_held(other.torque_is, other.torque_log) else set[str]()
     passed = {name: low_passed(theirs[name], ratio, name in held) for name in taken}
-    new = {name: PchipInterpolator(axis, values)(inner[start:stop]) for name, values in passed.items()}
+    ends: NDArray[np.float64] = np.append(inner[start:stop], inner[stop - 1] + rec.dt / (1.0 + fit.rate))
+    new = {
+        name: held_means(ends, axis, x) if name in held and x is theirs[name] else PchipInterpolator(axis, x)(ends[:-1])
+        for name, x in passed.items()
+    }
     channels: Mapping[str, Any] = {name: values[start:stop] for name, values in mine.items()} | new
     kind = other.torque_is if "torque" in taken and isinstance(other, Record) else None
     line = None

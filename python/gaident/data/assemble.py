@@ -23,7 +23,7 @@ from gaident.data.signals.decimation import Decimator, decimated, factor_of
 from gaident.data.signals.difference import backward_difference
 from gaident.data.signals.resampling import resampled
 from gaident.data.timeaxis import SLOW_STEP, TimeAxis
-from gaident.data.torque_kind import COMMANDED, MEAN, MEASURED, SMOOTH, kind_of_torque
+from gaident.data.torque_kind import COMMANDED, HELD, MEAN, MEASURED, SMOOTH, kind_of_torque
 from gaident.data.wanted import Wanted, si_factor
 from gaident.data.winding_torque import ELECTRICAL, torque_of_winding
 from gaident.errors import ReadError, RecordError
@@ -58,7 +58,7 @@ def assemble(table: LogTable, wanted: Wanted, stem: str) -> Record:
     kind = _torque_kind(table, wanted, named.get("torque")) if ELECTRICAL.isdisjoint(named) else ""
     counters = Counters(table, wanted, named)
     said: list[str] = [*_unnamed_torque(table, wanted, named), *_known_by_name(kind, wanted)]
-    held = {"torque"} if is_held(kind, wanted.torque_log) else set[str]()
+    held = {"torque": wanted.torque_log == HELD} if is_held(kind, wanted.torque_log) else {}
     if wanted.resample is not None:
         dt, values = _on_even_axis(table, wanted, named, scales, counters, held)
     else:
@@ -196,9 +196,14 @@ _Values = dict[str, NDArray[np.float64]]
 
 
 def _block_by_block(
-    table: LogTable, wanted: Wanted, named: dict[str, Column], scales: dict[str, float], counters: Counters, held: set[str]
+    table: LogTable,
+    wanted: Wanted,
+    named: dict[str, Column],
+    scales: dict[str, float],
+    counters: Counters,
+    held: Mapping[str, bool],
 ) -> tuple[float, _Values]:
-    """(dt [s], channel -> values in SI) of a log with one even time axis; held: channels that keep each value."""
+    """(dt [s], channel -> values in SI) of a log with one even time axis; held: see `resampled`."""
     time = common_clock(table, wanted, named)
     keys = {channel: column for channel, column in named.items() if column is not time}
     columns = [*keys.values(), *([] if time is None else [time])]
@@ -242,9 +247,14 @@ def _stated(table: LogTable, named: Mapping[str, Column]) -> float:
 
 
 def _on_even_axis(
-    table: LogTable, wanted: Wanted, named: dict[str, Column], scales: dict[str, float], counters: Counters, held: set[str]
+    table: LogTable,
+    wanted: Wanted,
+    named: dict[str, Column],
+    scales: dict[str, float],
+    counters: Counters,
+    held: Mapping[str, bool],
 ) -> tuple[float, _Values]:
-    """(dt [s], channel -> values in SI), each channel interpolated from time stamps of its own; held: as above."""
+    """(dt [s], channel -> values in SI), each channel interpolated from time stamps of its own; held: see `resampled`."""
     assert wanted.resample is not None
     clocks = {channel: clock_of(table, wanted, column) for channel, column in named.items()}
     parts: dict[str, list[tuple[NDArray[np.float64], NDArray[np.float64]]]] = {channel: [] for channel in named}

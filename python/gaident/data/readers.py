@@ -161,8 +161,8 @@ def read(
         10: every tenth sample behind a low-pass of linear phase whose delay is compensated, see `Record.decimate`.
         The log is decimated as it is read, whatever its length.
     resample : float, optional
-        Sample time [s] to which channels with irregular time stamps, or of several rates, are interpolated linearly.
-        Never done unasked.
+        Sample time [s] to which channels with irregular time stamps, or of several rates, are interpolated linearly; of a held
+        torque the mean over each line is taken. Never done unasked.
     gear_ratio : float, optional
         Turns of the motor per turn of the load [1].
     load_side : str or sequence of str

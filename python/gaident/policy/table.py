@@ -203,7 +203,7 @@ class Decisions:
     check_torque: float = check(
         0.05,
         "1",
-        "of the torque's rms: a smaller difference of friction, gravity, a spring at half the travel, force errors is immaterial",
+        "of the torque's rms: a smaller difference of friction, gravity, spring at half the travel or force error is immaterial",
         REAL,
     )
     velocity_part: float = check(

@@ -16,7 +16,7 @@ from gaident.estimation.dataset import DataSet
 from gaident.estimation.noise_model import WHITE
 from gaident.estimation.objective import Hypothesis, Innovations, Objective, OutputErrors
 from gaident.estimation.parameterisation import Parameterisation
-from gaident.estimation.prediction import OpenLoop
+from gaident.estimation.prediction import ClosedLoop, OpenLoop
 from gaident.estimation.prefilter import Prefilter
 from gaident.estimation.projection import project_out
 from gaident.estimation.term import Scales
@@ -139,3 +139,25 @@ def test_a_ripple_that_grows_with_the_speed_is_left_beside_one_that_does_not() -
     assert left.driver == "position", left.gains
     held = left_beside(u, w + 0.02 * w * np.cos(3.0 * angle), dt, ripple)
     assert held.driver is None, held.gains
+
+
+@pytest.mark.parametrize("order", [1.0, 3.0])
+def test_what_an_error_of_the_sensor_makes_in_the_loop(order: float) -> None:
+    """A simulated loop with a small ripple against the linear answer to that ripple; the controller answers, too."""
+    n, dt, a = 3000, 1e-3, 1e-4
+    axis, loop = ga.OneMass(J=0.01, D=0.02).model(), ga.PI(kp=0.5, ki=10.0)
+    command = 20.0 + 5.0 * np.sin(np.arange(n) / 200.0)
+    scales = Scales(dt, n * dt, 50.0, 1.0, 1.0, 10.0, 0.02, float("nan"), float("nan"), False, 1.0)
+    linear = Parameterisation.of(axis, scales, [False])
+    x = linear.start(axis)
+    rec = ga.Record(dt, velocity=np.zeros(n), command=command, torque=np.zeros(n))
+    smooth = ClosedLoop(DataSet.of([rec], loop)).velocities(linear, x[None, :])[0]
+    predictor = ClosedLoop(DataSet.of([rec.with_channels(velocity=smooth)], loop))  # whose angle is that of the motion
+    rippled = linear.extended(LIBRARY["velocity_ripple"])
+    moved = predictor.velocities(rippled, linear.inserted(x, np.array([a, 0.0, order]))[None, :])[0]
+    moved -= predictor.velocities(linear, x[None, :])[0]
+    angle = dt * np.append(0.0, np.cumsum(0.5 * (smooth[1:] + smooth[:-1])))
+    error = smooth * a * order * np.cos(order * angle)
+    answer = predictor.sensor_response(linear, x, error[None, :])[0]
+    assert np.std(answer - moved) < 0.01 * np.std(moved)
+    assert np.std(error - moved) > 0.1 * np.std(moved), "without the controller's answer"

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Mapping
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,13 +11,13 @@ from gaident.arguments import arg
 from gaident.errors import ReadError
 from gaident.policy.table import POLICY
 
-__all__ = ["resampled"]
+__all__ = ["held_means", "resampled"]
 
 
 def resampled(
-    path: str, channels: Mapping[str, tuple[NDArray[np.float64], NDArray[np.float64]]], dt: float, held: Collection[str] = ()
+    path: str, channels: Mapping[str, tuple[NDArray[np.float64], NDArray[np.float64]]], dt: float, held: Mapping[str, bool] = {}
 ) -> dict[str, NDArray[np.float64]]:
-    """Each channel by linear interpolation at t0 + n dt, t0 to t1 being what all channels cover.
+    """Each channel by linear interpolation at t0 + n dt, t0 to t1 being what all channels cover; one that is held by its means.
 
         x_held(n) = (1/dt) (integral of x from t0 + n dt to t0 + (n + 1) dt)    x keeps each value until the next time stamp
 
@@ -26,8 +26,8 @@ def resampled(
               that all cover
     dt        sample time of the result [s]; at most 1.5 times what the channels have, or high frequencies would alias;
               at least a hundredth of the finest
-    held      names of channels that keep each value until the next one, unless another channel was logged faster: then there are
-              values between those that were logged; the mean over a line of the result is held over it
+    held      name -> whether it is known that this channel keeps each value until the next one; where it is not known it does,
+              unless another channel was logged faster: then there are values between those that were logged
 
     Linear interpolation is a low-pass of its own (sinc^2 on average: -1.8 dB at a quarter of the log's sample rate) without
     delay. Raises ReadError.
@@ -64,19 +64,20 @@ def resampled(
     for name, (t, _) in logged.items():
         _refuse_gaps(path, name, t, start, stop)
     axis = start + dt * np.arange(int(np.floor((stop - start) / dt + 1e-6)) + 1)
-    fast = POLICY.resample_coarser * finest
-    kept = {name for name, (t, _) in logged.items() if name in held and float(np.median(np.diff(t))) <= fast}
-    return {
-        name: _means(len(axis), dt, t - start, x) if name in kept else np.interp(axis, t, x) for name, (t, x) in logged.items()
-    }
+    ends: NDArray[np.float64] = dt * np.arange(len(axis) + 1.0)
+
+    def even(name: str, t: NDArray[np.float64], x: NDArray[np.float64]) -> NDArray[np.float64]:
+        fast = float(np.median(np.diff(t))) <= POLICY.resample_coarser * finest
+        return held_means(ends, t - start, x) if held.get(name, False) or (name in held and fast) else np.interp(axis, t, x)
+
+    return {name: even(name, t, x) for name, (t, x) in logged.items()}
 
 
-def _means(count: int, dt: float, t: NDArray[np.float64], x: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Of a signal that is x from each t on, t from the first line, the mean over each line of an even axis."""
-    ends = dt * np.arange(count + 1)
-    last = max(t[-1], ends[-1]) + dt  # its last value is held to the end
+def held_means(ends: NDArray[np.float64], t: NDArray[np.float64], x: NDArray[np.float64]) -> NDArray[np.float64]:
+    """The means between the times `ends` (n + 1,) of a signal that is x(i) from t(i) on, the last one to the end; shape (n,)."""
+    last = max(t[-1], ends[-1]) + 1.0  # no decision: a formula: any time behind both
     area = np.append(0.0, np.cumsum(x * np.diff(t, append=last)))
-    return np.asarray(np.diff(np.interp(ends, np.append(t, last), area)) / dt)
+    return np.asarray(np.diff(np.interp(ends, np.append(t, last), area)) / np.diff(ends))
 
 
 def _refuse_gaps(path: str, name: str, t: NDArray[np.float64], start: float, stop: float) -> None:

@@ -3,7 +3,7 @@
 Each driver is one family, or several, of torques that span the functions of it: piecewise linear ones of velocity, torque and
 position, harmonics of the angle, elasto-plastic elements (what depends on the past path), single frequencies in time.
 A load, dry friction and a torque constant that change in time are a family each; so is a wave of the angle of an order that the
-model contains, at the shaft or of the sensor, whose size changes with the speed: no effect of the library has that law.
+model contains, at the shaft or of the sensor, whose size is any parabola of the speed.
 The linear part of the model answers to each; what the answers explain of the whitened error, beyond what the model's own
 parameters could, is the gain in BIC units; the best family's is the driver's.
 """
