@@ -44,9 +44,8 @@ def main() -> int:
                 off = dia.mechanics["inertia"].value / (truth.plant.J + truth.plant.JL) - 1.0
                 named = ", ".join(f.effect for f in dia.findings if not f.is_noise)
                 took = time.process_time() - began
-                print(
-                    f"| {seed} | {1e3 * record.dt:.3g} | {noise:g} | {factor} | {dia.verdict} | {named} | {off:.3%} | {took:.1f} |"
-                )
+                case = f"{seed} | {1e3 * record.dt:.3g} | {noise:g} | {factor}"
+                print(f"| {case} | {dia.verdict} | {named} | {off:.3%} | {took:.1f} |")
                 verdicts[dia.verdict] += 1
                 furthest = max(furthest, abs(off))
     print(f"\n{dict(verdicts)}; the furthest inertia is {furthest:.3%} off")
