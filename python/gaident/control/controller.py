@@ -201,7 +201,10 @@ class Controller(ABC):
 
     @abstractmethod
     def ticks(self, dt: float, command: Vector, position: Vector | None) -> Ticks:
-        """What it is given at its own clock, in a log with the sample time dt [s]; command: of `command_of`, or `source_of`."""
+        """What it is given at its own clock, in a log with the sample time dt [s]; command: of `command_of`, or `source_of`.
+
+        position: at the lines (n,), or at its own clock (n, r).
+        """
 
     @abstractmethod
     def core_loop(self, dt: float) -> _core.Loop:

@@ -65,7 +65,7 @@ def ticks_of(
     """dt: sample time of the log [s], which has a line for every `every`-th sample of the controller.
 
     command: velocity command [rad/s], or with a position controller position command [rad], shape (n,); or at the
-    controller's samples, where these are known, shape (n, every).
+    controller's samples, where these are known, shape (n, every). position: measured [rad], either shape, too.
     placed: samples from one of the position controller's to the next; 0: there is none.
     between: of INTERPOLATIONS, how a position command goes from line to line.
     """
@@ -79,12 +79,15 @@ def ticks_of(
     fed = np.zeros(0)
     if feed.acceleration != 0.0 or feed.friction != 0.0:
         fed = feed.acceleration * _slope(velocity, step, period) + feed.friction * np.sign(velocity)
+    measured = np.zeros(0)
+    if position is not None:
+        measured = smooth_between(position, every) if position.ndim == 1 else position.ravel()
     return Ticks(
         every,
         source,
         feed.velocity * velocity if feed.velocity != 0.0 else np.zeros(0),
         fed,
-        np.zeros(0) if position is None else smooth_between(position, every),
+        measured,
     )
 
 

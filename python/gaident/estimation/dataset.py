@@ -23,7 +23,7 @@ from gaident.control.found import FoundNumbers
 from gaident.control.pi import PI, bare_pi
 from gaident.data.record import Record
 from gaident.data.torque_kind import MEASURED
-from gaident.estimation.mean_velocity import means, with_middles
+from gaident.estimation.mean_velocity import halved, means, with_middles
 from gaident.estimation.period import period_of_place
 from gaident.estimation.term import Term, limiting_of
 from gaident.models.drive_torque import as_late, torque_of
@@ -33,7 +33,7 @@ from gaident.models.simulation_input import followed
 from gaident.models.starts import noise_std, starts_moving, torque_before
 from gaident.policy.table import POLICY
 
-__all__ = ["DataSet", "with_angle"]
+__all__ = ["DataSet"]
 
 Vector = NDArray[np.float64]
 Matrix = NDArray[np.float64]
@@ -96,8 +96,8 @@ class DataSet:
     ) -> DataSet:
         """The records as driven by their torque; spoiled: some velocities are not what the controller read."""
         driven = tuple(_driven(r, torque_of(r, bare_pi(controller))) for r in records)
-        turned = tuple(with_angle(r, angle_of(a)) for r, a in zip(records, driven, strict=True))
-        free = _freed(records, driven)
+        turned = tuple(r.with_channels(position=angle_of(a)) for r, a in zip(records, driven, strict=True))
+        free = freed(records, driven)
         moving = tuple(starts_moving(r, None) for r in driven)
         seen = tuple(records if read is None else read)
         measured = any(r.torque_is == MEASURED for r in records)
@@ -108,7 +108,7 @@ class DataSet:
         """The same records, whose torque is not logged, under another controller."""
         pi = bare_pi(controller)
         driven = tuple(_driven(r, controller.torque_of(r) if pi is None else torque_of(r, pi)) for r in self.records)
-        return replace(self, controller=controller, driven=driven, free=_freed(self.records, driven), found=None)
+        return replace(self, controller=controller, driven=driven, free=freed(self.records, driven), found=None)
 
     def with_its_period(self) -> DataSet:
         """The same with the period that the records show, where none is known."""
@@ -132,13 +132,18 @@ class DataSet:
 
     def ready(self, rec: Record, at: int) -> Record:
         """A record whose simulation `seen` takes for the velocity that the sensor shows; at: its place among the records."""
-        if not self.age:
-            return rec
         if not self.differenced:
             return self.as_old(rec)
         if rec.position is not None and self.records[at].position is None:  # integrated from the velocity, the angle is as old
             rec = rec.with_channels(position=rec.position + self.age * self.dt * rec.velocity)
         return with_middles(rec)
+
+    def ready_angle(self, angle: Vector, at: int) -> Vector:
+        """Another angle (n,) [rad] of a record, for the one made `ready`."""
+        if not self.differenced:
+            return angle
+        rec = self.records[at]
+        return halved(angle + self.age * self.dt * rec.velocity if rec.position is None else angle)
 
     def seen(self, rows: Matrix) -> Matrix:
         """Rows of velocities that the sensor shows, of those that a record made `ready` gives."""
@@ -278,7 +283,12 @@ class DataSet:
         if controller is not None:
             return LoadedRecord.of(rec, controller)
         ready = self.ready(rec, at)
-        return LoadedRecord.of(ready, None, torque_before(ready, load_before(self.records[at], self.controller)))
+        return LoadedRecord.of(ready, None, torque_before(ready, self._loads[at]))
+
+    @cached_property
+    def _loads(self) -> tuple[float, ...]:
+        """What the integrator stored before each record for a load [N m]."""
+        return tuple(load_before(r, self.controller) for r in self.records)
 
     @cached_property
     def _loaded(self) -> dict[tuple[str, Controller | None], tuple[LoadedRecord, ...]]:
@@ -339,14 +349,8 @@ class DataSet:
 
     def replayed(self, effects: Mapping[Term, Vector]) -> tuple[Record, ...]:
         """The records as driven by the torque that the controller makes with effects of its own, each with its parameters."""
-        driven = []
-        for r, read, stored in zip(self.records, self.read, self.stored, strict=True):
-            driven.append(_driven(r, replayed(read, self.controller, effects, stored)))
-        return tuple(driven)
-
-    def freed(self, driven: Sequence[Record]) -> tuple[Record, ...]:
-        """Torque-driven records without an angle that was not measured."""
-        return _freed(self.records, driven)
+        rows = zip(self.records, self.read, self.stored, strict=True)
+        return tuple(_driven(r, replayed(read, self.controller, effects, stored)) for r, read, stored in rows)
 
     def replayed_error(self, effects: Mapping[Term, Vector]) -> Vector:
         """Logged torque minus the controller's replay with these effects, records one after the other [N m]."""
@@ -371,19 +375,14 @@ def replayed(rec: Record, controller: Controller | None, effects: Mapping[Term, 
     return controller.torque_of(rec, limiting_of(effects) if effects else None, stored)
 
 
-def with_angle(rec: Record, angle: Vector | None) -> Record:
-    """The record with another angle [rad], or none."""
-    return rec.with_channels(position=angle)
-
-
-def _freed(records: Sequence[Record], driven: Sequence[Record]) -> tuple[Record, ...]:
-    return tuple(a if r.position is not None else with_angle(a, None) for r, a in zip(records, driven, strict=True))
+def freed(records: Sequence[Record], driven: Sequence[Record]) -> tuple[Record, ...]:
+    """Torque-driven records without an angle that was not measured."""
+    return tuple(a if r.position is not None else a.with_channels(position=None) for r, a in zip(records, driven, strict=True))
 
 
 def _driven(rec: Record, torque: Vector) -> Record:
-    angle = rec.position
+    angle, w = rec.position, rec.velocity
     if angle is None:
-        w = rec.velocity
         angle = np.concatenate([[0.0], np.cumsum(0.5 * rec.dt * (w[1:] + w[:-1]))])
     return rec.with_channels(command=None, torque=torque, position=angle)
 

@@ -21,6 +21,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,7 +32,7 @@ from gaident.control.pi import bare_pi
 from gaident.data.record import Record
 from gaident.estimation import least_squares as ls
 from gaident.estimation.criterion import cost_of, effective_samples, gained
-from gaident.estimation.dataset import DataSet, torque_in
+from gaident.estimation.dataset import DataSet, freed, torque_in
 from gaident.estimation.noise_model import NoiseFilter
 from gaident.estimation.objective import LOST, Fit, Hypothesis, Innovations, Objective
 from gaident.estimation.projection import WORST, inverse_of, project_out
@@ -69,9 +70,10 @@ def moved(data: DataSet, by: Vector) -> DataSet | None:
     pairs = [(_made(r, here), _made(r, there)) for r in data.read or data.records]
     driven = tuple(r.with_channels(torque=torque_in(r) + v - u) for r, (u, v) in zip(data.driven, pairs, strict=True))
     limited = there.with_limits(*data.controller.limits)
-    return replace(data, controller=limited, driven=driven, free=data.freed(driven), found=found)
+    return replace(data, controller=limited, driven=driven, free=freed(data.records, driven), found=found)
 
 
+@lru_cache(maxsize=16)  # every candidate is asked with the same few controllers
 def _made(rec: Record, controller: Controller) -> Vector:
     """The torque over each line [N m], as this controller makes it where the record has none, or fewer lines than it samples."""
     pi = bare_pi(controller)

@@ -25,22 +25,26 @@ from gaident.models.held_torque import kind_of_held, sampled_between
 from gaident.models.simulate import Run, run, simulate
 from gaident.models.simulation_input import AnyModel
 
-__all__ = ["means", "run_as_seen", "with_middles"]
+__all__ = ["halved", "means", "run_as_seen", "with_middles"]
 
 Matrix = NDArray[np.float64]
+
+
+def halved(x: NDArray[np.float64], later: float = 0.0) -> NDArray[np.float64]:
+    """A signal (n,) with twice the samples, half way between; later: than these, in lines. The last one is held."""
+    at = 0.5 * np.arange(2 * len(x)) + later  # no decision: a formula: the middle
+    return np.asarray(np.interp(at, np.arange(len(x)), x))
 
 
 @lru_cache(maxsize=16)
 def with_middles(rec: Record) -> Record:
     """The record with twice the samples: its torque as it is held, everything else half way between."""
-    n = 2 * len(rec)
-    at = 0.5 * np.arange(n)  # no decision: a formula: the middle
 
     def between(name: str, x: NDArray[np.float64]) -> NDArray[np.float64]:
         if name != "torque":
-            return np.asarray(np.interp(at, np.arange(len(rec)), x))
+            return halved(x)
         # no decision: a quarter of the line is the middle of its half
-        return np.asarray(np.interp(at + 0.25, np.arange(len(rec)), x) if sampled_between(rec) else np.repeat(x, 2))
+        return halved(x, 0.25) if sampled_between(rec) else np.repeat(x, 2)
 
     channels: dict[str, Any] = {name: between(name, x) for name, x in rec.channels()}
     half = 0.5 * rec.dt  # no decision: a formula: half the sample

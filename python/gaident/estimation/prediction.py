@@ -25,7 +25,7 @@ from gaident.control.filtering import filtered
 from gaident.control.pi import PI
 from gaident.data.record import Record
 from gaident.data.torque_kind import MEASURED
-from gaident.estimation.dataset import DataSet, angle_of, with_angle
+from gaident.estimation.dataset import DataSet, angle_of, freed
 from gaident.estimation.parameterisation import Parameterisation
 from gaident.estimation.term import Term
 from gaident.models.effects import place_of
@@ -116,7 +116,7 @@ class OpenLoop:
         for i, row in enumerate(first.tolist()):
             of_row = np.flatnonzero(group.ravel() == i)
             records = self.data.replayed({t: part[row] for t, part in zip(inside, parts, strict=True)})
-            records = self.data.freed(records) if self.own_angle else records
+            records = freed(self.data.records, records) if self.own_angle else records
             out[of_row] = self._under(parameters, X[of_row], records, [t.name for t in inside])
         return out
 
@@ -262,18 +262,18 @@ def _of_true_angle(
     bent = [(t.seen_angle, parameters.effect_values(x[None, :], t.name)[0]) for t in bending]
     steps = substeps(data, parameters.terms, controller)
     parts = []
-    for i, (record, driven) in enumerate(zip(records, data.driven, strict=True)):
+    for i, (loaded, driven) in enumerate(zip(data.loaded(records, controller), data.driven, strict=True)):
         angle = angle_of(driven)
         for true_angle, own in bent:
             assert true_angle is not None
             angle = true_angle(angle, driven.velocity, own)
-        closed = controller is not None
-        states = parameters.standing(1, data.stored[i]) if closed else parameters.start_values(x[None, :], i)
-        turned = with_angle(record, angle)
-        taken = data.steps_of(steps) if controller is None else steps
-        loaded = data.load(turned, i, controller)
-        run = loaded.velocities(parameters.structure, names, values, initial_states=states, substeps=taken)
-        parts.append(data.seen(run) if controller is None else run)
+        if controller is not None:
+            run, states, taken = loaded.turned(angle), parameters.standing(1, data.stored[i]), steps
+        else:
+            run, states = loaded.turned(data.ready_angle(angle, i)), parameters.start_values(x[None, :], i)
+            taken = data.steps_of(steps)
+        seen = run.velocities(parameters.structure, names, values, initial_states=states, substeps=taken)
+        parts.append(seen if controller is not None else data.seen(seen))
     return np.concatenate(parts, axis=1)
 
 

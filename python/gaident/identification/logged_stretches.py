@@ -34,14 +34,15 @@ Matrix = NDArray[np.float64]
 class Log:
     """Lines of a record; velocity: at the controller's samples. stretch (n,): number of the line's stretch; -1: none.
 
-    moving: it starts in motion, and what the integrator stored before is not known. between: the command at the controller's
-    samples (n, r) where it is known there, see `Controller.source_of`; else `source`. mean: of means since the line before.
+    position: at the controller's samples (n, r). between: the command at the controller's samples (n, r) where it is known
+    there, see `Controller.source_of`; else `source`. moving: it starts in motion, and what the integrator stored before is not
+    known. mean: of means since the line before.
     """
 
     dt: float
     source: Vector
     velocity: Vector
-    position: Vector | None
+    position: Matrix | None
     torque: Vector
     stretch: NDArray[np.intp]
     between: Vector
@@ -117,7 +118,9 @@ def log_of(rec: Record, share: int, cascade: Cascade, whole: bool) -> Log:
         # no decision: a quarter of the memory, as where few lines are left, and of a short record a quarter of its lines
         stretch[: min(POLICY.filter_memory // 4, len(stretch) // 4)] = -1
     velocity = smooth_between(part.velocity, every)
-    position = part.position if cascade.position is not None else None
+    position = None
+    if cascade.position is not None and part.position is not None:
+        position = smooth_between(part.position, every).reshape(-1, every)
     return Log(rec.dt, source, velocity, position, part.torque, stretch, between, moving, mean)
 
 
@@ -150,12 +153,11 @@ def whitened(d: Vector, stretch: NDArray[np.intp], rho: float) -> tuple[Vector, 
 
 
 def centred(c: Vector, stretch: NDArray[np.intp], whole: bool) -> Vector:
-    """c without the mean of its stretch; `whole`: as it is."""
+    """c without the mean of its stretch, whose number is 0 or more; `whole`: as it is."""
     if whole or not len(c):
         return c
-    _, own = np.unique(stretch, return_inverse=True)
-    means = np.bincount(own, c) / np.bincount(own)
-    left: Vector = c - means[own]
+    means = np.bincount(stretch, c) / np.maximum(np.bincount(stretch), 1)
+    left: Vector = c - means[stretch]
     return left
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -145,13 +145,20 @@ class LoadedRecord:
     """A record and its loop as the core takes them: made once for all simulations of a fit."""
 
     core: _core.EffectRecord
+    rec: Record
     controller: Controller | None
+    before: float
 
     @classmethod
     def of(cls, rec: Record, controller: Controller | None, before: float = 0.0) -> LoadedRecord:
         """Of a record that has what drives the loop; RecordError else. before: as in `core_record`."""
         source, _ = input_for(1, rec, controller)
-        return cls(core_record(rec, source, controller, before), controller)
+        return cls(core_record(rec, source, controller, before), rec, controller, before)
+
+    def turned(self, angle: Signal) -> LoadedRecord:
+        """The same with another angle [rad] (n,)."""
+        source, _ = input_for(1, self.rec, self.controller)
+        return replace(self, core=core_record(self.rec, source, self.controller, self.before, angle))
 
     def velocities(
         self,

@@ -117,11 +117,17 @@ def checked_substeps(substeps: int | None) -> int:
     return substeps
 
 
-def core_record(rec: Record, source: Signal, controller: Controller | None, before: float = 0.0) -> _core.EffectRecord:
-    """A record as the core takes it; before: the torque that acted before it, of an open loop [N m]."""
+def core_record(
+    rec: Record, source: Signal, controller: Controller | None, before: float = 0.0, angle: Signal | None = None
+) -> _core.EffectRecord:
+    """A record as the core takes it; before: the torque that acted before it, of an open loop [N m].
+
+    angle: in the place of the record's own [rad] (n,).
+    """
     start = 0.0 if controller is None else controller.start_angle(source)
-    if rec.position is not None:
-        start = float(rec.position[0])
+    angle = rec.position if angle is None else angle
+    if angle is not None:
+        start = float(angle[0])
     between = None if controller is None else controller.source_of(rec)
     source = source if between is None else between
-    return core.effect_record(rec.dt, source, rec.position, rec.velocity, start, controller, before)
+    return core.effect_record(rec.dt, source, angle, rec.velocity, start, controller, before)

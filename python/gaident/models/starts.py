@@ -68,12 +68,12 @@ def torque_before(rec: Record, stored: float = 0.0) -> float:
     """
     if rec.torque is None:
         return 0.0
-    if starts_moving(rec, None):
+    first, rest = np.abs(rec.velocity[: POLICY.held_samples]), _rest(rec)
+    if first[0] > rest and not _constant_input(rec, None):  # `starts_moving`, of an open loop
         return float(rec.torque[0])
     if stored:
         return stored
-    first = rec.velocity[: POLICY.held_samples]
-    return float(rec.torque[0]) if np.all(np.abs(first) <= _rest(rec)) else 0.0
+    return float(rec.torque[0]) if np.all(first <= rest) else 0.0
 
 
 def constant_beside(off: NDArray[np.float64], size: float) -> float:

@@ -324,7 +324,8 @@ TEST_CASE("counting: the stop flag ends a search that would go on for hours, on 
                 stop = true;
             });
             Settings s = of(20, 10000000);
-            s.round = s.quiet_rounds = 10000000;
+            s.round = 100;
+            s.quiet_rounds = 10000000;
             const Resources resources{all, progress, &stop};
             if (with_species) CHECK_THROWS(search_species<Point>(Towers(0, true), s, 2, 1, resources), Stopped);
             else CHECK_THROWS(search(Ones(130), s, 2, 1, resources), Stopped);

@@ -10,7 +10,7 @@ import pytest
 import gaident as ga
 from gaident.control.controller import Limiting
 from gaident.diagnosis.library.terms import LIBRARY
-from gaident.estimation.dataset import DataSet, torque_in, with_angle
+from gaident.estimation.dataset import DataSet, torque_in
 from gaident.estimation.parameterisation import Parameterisation
 from gaident.estimation.prediction import ClosedLoop, ObserverLoop, OpenLoop
 from gaident.estimation.term import Scales, Term
@@ -48,7 +48,7 @@ def test_the_angle_is_the_same_matter_with_an_effect_of_the_controller(own_angle
     less, y = parameters(COGGING, *beside)
     torque = torque_in(found.replayed({CLAMP: np.exp(VALUES[CLAMP.name])})[0])
     driven = (found.driven[0].with_channels(torque=torque),)
-    clamped = replace(found, driven=driven, free=tuple(with_angle(r, None) for r in driven))
+    clamped = replace(found, driven=driven, free=tuple(r.with_channels(position=None) for r in driven))
     w = OpenLoop(found, own_angle).velocities(p, x[None, :])
     np.testing.assert_array_equal(w, OpenLoop(clamped, own_angle).velocities(less, y[None, :]))
     other = OpenLoop(found, not own_angle).velocities(p, x[None, :])

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -109,7 +110,7 @@ class Law:
         lines = np.concatenate([at_lines(part, self.every, mean) for part, mean in parts], axis=1)
         return self._fitted(np.concatenate([lines, starts]))
 
-    @property
+    @cached_property
     def logged(self) -> Vector:
         """The torque [N m] (n used,)."""
         torque = self._fitted(self.torque[None, :])[:, 0]
