@@ -43,8 +43,11 @@ class Repeated(SideMoves):
         """The fit or, where these score better, two masses with another resonance.
 
         A fit at the wrong resonance may leave small errors: its noise filter treats the ringing that it misses as noise.
+        There a delay may do better than the lag that is there: each is tried in the place of the other, with its own resonance.
         """
-        return min((fit, *self.elsewhere(fit)), key=self.score)
+        others = [] if self.quiet(fit) else self.in_other_series(fit.hypothesis, fit.x)
+        tries = [fit, *(replace(fit, hypothesis=h, x=x) for h, x in others)]
+        return min((fit, *(found for one in tries for found in self.elsewhere(one))), key=self.score)
 
     def elsewhere(self, fit: Fit) -> list[Fit]:
         """Two masses with the same effects, their resonance searched again: that of the fit was found before the effects.

@@ -189,7 +189,8 @@ def _score(objective: Objective, scales: Scales, model: Model) -> float:
 
     A mechanism fitted without the lag has a wrong resonance in its place, and a fit from there does not find the lag.
     So the lag is also fitted to one mass, and the resonance beside it.
-    A resonance faster than the records show is not allowed: it would replace the age.
+    A resonance faster than the records show is not allowed, unless the mechanism without the lag has one too: it would replace
+    the age.
     Each is scored: one that leaves least without a noise filter need not do so with one.
     """
     task = Task(objective, scales, model, (), lambda message: None).under(Innovations())
@@ -198,7 +199,9 @@ def _score(objective: Objective, scales: Scales, model: Model) -> float:
     base, late = min((one, *two), key=lambda f: f.cost), _with_lag(task, lag, one)
     shafts = [ls.fit(objective, hypothesis, x, WHITE, POLICY.short) for hypothesis, x in on_a_shaft(objective, late)]
     seen = POLICY.seen_band * np.pi / task.data.dt
-    shafts = [f for f in shafts if swings(f) and is_mechanism(f.parameters, f.x) and resonance(f) < seen]
+    shafts = [
+        f for f in shafts if swings(f) and is_mechanism(f.parameters, f.x) and (resonance(f) < seen or resonance(base) > seen)
+    ]
     lagging = (late, _with_lag(task, lag, base), *shafts)
     return min(space.score(space.refitted(f.hypothesis, f.x)) for f in (base, *lagging))
 
