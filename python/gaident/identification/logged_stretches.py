@@ -21,7 +21,7 @@ from gaident.control.ticks import push_of, smooth_between, straight_between
 from gaident.data.record import Record
 from gaident.data.torque_kind import MEAN
 from gaident.models.made_torque import stored_beside
-from gaident.models.starts import noise_std, starts_moving
+from gaident.models.starts import starts_moving
 from gaident.policy.table import POLICY
 
 __all__ = ["Log", "centred", "correlation", "correlation_of", "log_of", "numbered", "plateau_of", "unlimited", "whitened"]
@@ -110,9 +110,7 @@ def log_of(rec: Record, share: int, cascade: Cascade, whole: bool) -> Log:
     free = size < POLICY.at_limit * limit if not whole else np.ones(len(size), bool)
     if mean:  # a line beside a limited one is the mean of limited samples, too
         free = free & np.append(True, free[:-1]) & np.append(free[1:], True)
-    # Behind a limit that the torque may have reached between two lines the integral is another one, as behind one on a line.
-    apart = np.zeros(len(size), bool) if whole else np.append(False, reached_between(part.torque, POLICY.at_limit * limit))
-    begins = free & ~(np.append(False, free[:-1]) & ~apart)
+    begins = free & ~np.append(False, free[:-1])
     stretch = np.where(free, np.cumsum(begins) - 1, -1)
     stretch[len(stretch) - cascade.ahead(rec.dt) :] = -1
     moving = starts_moving(part, None)
@@ -130,21 +128,6 @@ def plateau_of(size: Vector) -> float:
     """A limit that was not given: the highest torque, where as many lines stand at it as a plateau has; else infinity."""
     highest = float(size.max())
     return highest if np.sum(size >= POLICY.at_limit * highest) >= POLICY.plateau else np.inf
-
-
-def reached_between(torque: Vector, limit: float) -> NDArray[np.bool_]:
-    """Of each interval between two lines (n - 1,), whether the torque may be at a limit there [N m] while it is not on the lines.
-
-    Between two lines a smooth torque u exceeds the larger of the two by an eighth of its second difference at most; its noise
-    comes on top.
-    """
-    if not np.isfinite(limit):
-        return np.zeros(len(torque) - 1, bool)
-    size = np.abs(torque)
-    bend = np.pad(np.abs(np.diff(torque, 2)), 1)
-    most = np.maximum(size[1:], size[:-1]) + np.maximum(bend[1:], bend[:-1]) / 8.0  # no decision: a formula
-    may: NDArray[np.bool_] = most + POLICY.above_noise * noise_std(torque) >= limit
-    return may
 
 
 def unlimited(pi: PI) -> PI:

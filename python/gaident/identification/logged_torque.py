@@ -6,8 +6,7 @@ What the velocity did between the lines is lost: d is compared with what other i
     a straight line instead of a cubic spline, and that spline with white noise between the lines, as large as that at the lines,
 
 which the integrator adds up: all three without their correlation from line to line, rho (Cochrane and Orcutt 1949).
-An anti-windup at a limit decides also at samples between the lines whether the integral changes, and the torque may reach the
-limit there alone (`logged_stretches.reached_between`).
+An anti-windup at a limit decides also at samples between the lines whether the integral changes.
 So the integral after a limit is uncertain by its change in one line where the torque reaches the limit,
 and by that in one line where it leaves it: 2 ki dt |e| together. Only stretches between limits are compared.
 
@@ -129,9 +128,8 @@ def _as_before_a_limit(log: Log, error: Vector, cascade: Cascade, left: Vector, 
 
     error: what the integrator reads at the lines [rad/s].
     """
-    other = log.stretch[:-1] != log.stretch[1:]
-    before = np.flatnonzero(other & (log.stretch[:-1] >= 0))
-    after = np.flatnonzero(other & (log.stretch[1:] >= 0)) + 1
+    before = np.flatnonzero((log.stretch[:-1] >= 0) & (log.stretch[1:] < 0))
+    after = np.flatnonzero((log.stretch[:-1] < 0) & (log.stretch[1:] >= 0)) + 1
     pairs = list(zip(before, after[after > before.min(initial=len(left))], strict=False))  # the last limit may have no end
     ki = cascade.velocity.ki or 0.0
     open_by = [2.0 * ki * log.dt * float(np.abs(error[a : b + 1]).max()) for a, b in pairs]

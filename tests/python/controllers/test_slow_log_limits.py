@@ -16,7 +16,6 @@ from drive_cases import random_case
 from gaident.diagnosis.controller.as_read import outliers_of_the_log
 from gaident.diagnosis.controller.form_findings import loop_of
 from gaident.diagnosis.controller.slow_forms import limited
-from gaident.identification.logged_stretches import reached_between
 from gaident.identification.logged_torque import not_followed
 from loop_cases import loop_kind, loop_noise, loop_plant
 
@@ -56,8 +55,7 @@ def test_an_integral_held_at_a_limit_is_open_by_what_it_moves_between_two_lines(
         ga.PI(controller.velocity.kp, controller.velocity.ki, torque_limit=controller.velocity.torque_limit), 125e-6
     )
     assert not_followed([rec], other)
-    for part in (0.27, 0.52):  # where no limit acts
-        assert not_followed([rec.with_channels(torque=rec.torque + 0.01 * (rec.time > part * rec.time[-1]))], controller)
+    assert not_followed([rec.with_channels(torque=rec.torque + 0.01 * (rec.time > 0.5 * rec.time[-1]))], controller)
 
 
 @pytest.mark.parametrize(("loop", "noise"), [("backward", "white"), ("velocity filter", "encoder")])
@@ -76,21 +74,3 @@ def test_an_outlier_that_the_controller_read_stays() -> None:
     answered = rec.torque - 20.0 * controller.velocity.kp * (np.arange(len(rec)) == 1000)
     (read,), (lines,) = outliers_of_the_log([rec.with_channels(velocity=spoiled, torque=answered)], controller)
     assert lines.tolist() == [] and read.velocity[1000] == spoiled[1000]
-
-
-def test_a_limit_that_the_torque_reaches_between_two_lines_alone_opens_the_integral_too() -> None:
-    """No line of the log is at the limit there: the torque comes within 0.3 % of it, and the integral is held for one sample."""
-    rec, later, controller, _ = case("hold", 4, "encoder", seed=1101000000)
-    limit = controller.limits[0]
-    near = np.abs(rec.torque)
-    assert np.any((near[1:-1] > 0.995 * limit) & (np.maximum(near[:-2], near[2:]) < 0.999 * limit) & (near[1:-1] < 0.999 * limit))
-    assert not_followed([rec], controller) == ()
-    dia = ga.diagnose(rec, controller, validation=later)
-    assert dia.verdict == "adequate" and not dia.causes
-
-
-def test_what_a_smooth_torque_reaches_between_two_lines_follows_from_its_bend() -> None:
-    torque = 10.01 * np.cos(2.0 * np.pi * (np.arange(200) - 50.5) / 80.0)  # 10.01 half way between two lines, 10.002 on them
-    reached = np.flatnonzero(reached_between(torque, 10.0075))
-    assert {10, 50, 90, 130, 170} <= {*reached.tolist()} and np.all(np.abs((reached - 10) % 40 - 20) >= 19)
-    assert not reached_between(torque, np.inf).any()
