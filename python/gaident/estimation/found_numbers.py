@@ -21,7 +21,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
-from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -73,7 +72,6 @@ def moved(data: DataSet, by: Vector) -> DataSet | None:
     return replace(data, controller=limited, driven=driven, free=freed(data.records, driven), found=found)
 
 
-@lru_cache(maxsize=16)  # every candidate is asked with the same few controllers
 def _made(rec: Record, controller: Controller) -> Vector:
     """The torque over each line [N m], as this controller makes it where the record has none, or fewer lines than it samples."""
     pi = bare_pi(controller)

@@ -142,7 +142,7 @@ def simulate_values(
 
 @dataclass(frozen=True, eq=False)
 class LoadedRecord:
-    """A record and its loop as the core takes them: made once for all simulations of a fit."""
+    """A record and its loop as the core takes them: made once for all simulations of a fit. before: as in `core_record`."""
 
     core: _core.EffectRecord
     rec: Record

@@ -133,7 +133,10 @@ public:
     double least_expected() const override { return least_; }
 
     // Chromosomes evaluated so far, by species.
-    std::map<std::size_t, int> evaluated() const { return evaluated_; }
+    std::map<std::size_t, int> evaluated() const {
+        const std::lock_guard<std::mutex> guard(lock_);
+        return evaluated_;
+    }
 
 private:
     static Point judged(Point p) {
@@ -319,18 +322,21 @@ TEST_CASE("counting: the stop flag ends a search that would go on for hours, on 
             std::atomic<bool> stop{false};
             Workers all(workers);
             Progress progress;
+            const Towers objective(0, true);
             std::thread user([&] {
-                while (progress.done < 50) std::this_thread::yield();
+                // Islands are bred one after the other, and the progress counts the generations of the last: evaluations do for it.
+                const auto bred = [&] { return with_species ? !objective.evaluated().empty() : progress.done >= 50; };
+                while (!bred()) std::this_thread::yield();
                 stop = true;
             });
             Settings s = of(20, 10000000);
-            s.round = 100;
-            s.quiet_rounds = 10000000;
+            s.round = s.quiet_rounds = 10000000;
             const Resources resources{all, progress, &stop};
-            if (with_species) CHECK_THROWS(search_species<Point>(Towers(0, true), s, 2, 1, resources), Stopped);
+            if (with_species) CHECK_THROWS(search_species<Point>(objective, s, 2, 1, resources), Stopped);
             else CHECK_THROWS(search(Ones(130), s, 2, 1, resources), Stopped);
             user.join();
             CHECK(progress.done < 10000000);
+            for (const auto& [species, count] : objective.evaluated()) CHECK(count < 10000000);  // no island ended its round
         }
 }
 

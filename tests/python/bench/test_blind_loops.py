@@ -138,3 +138,18 @@ def test_jumps_fall_between_the_lines(blind: Any, loop: str) -> None:
     speed = np.diff(truth.command, prepend=0.0) / 125e-6 if truth.plant.placed else truth.command
     begins = np.flatnonzero(np.abs(np.diff(speed)) > 1e-6) + 1
     assert len(begins) > 15 and np.mean(begins % 8 != 0) > 0.6
+
+
+def test_a_lag_is_found_beside_a_resonance_that_the_log_does_not_show(monkeypatch: pytest.MonkeyPatch) -> None:
+    """442 Hz in a line each millisecond: a delay beside a wrong resonance was named, and the inertia 0.83 % off."""
+    monkeypatch.syspath_prepend(str(BENCH))
+    monkeypatch.syspath_prepend(str(BENCH / "loops"))
+    forms = importlib.import_module("loop_forms")
+    record, validation, whole, truth = forms.Case("bare", 8, "", 1102000, "whole").drawn()
+    dia = ga.diagnose(record, whole, validation=validation)
+    (cause,) = dia.causes
+    assert {cause.effect, *cause.alternatives} == {"torque_lag", "velocity_filter"} and dia.verdict == "explained"
+    lag = cause.parameters["time_constant"].value
+    assert lag == pytest.approx(truth.effects["torque_lag"]["time_constant"], rel=0.02)
+    assert dia.mechanics["inertia"].value == pytest.approx(truth.plant.J + truth.plant.JL, rel=2e-3)
+    assert dia.velocity_age == 0.5 / 8

@@ -110,3 +110,19 @@ def test_substeps_are_those_of_the_samples_that_are_simulated() -> None:
     slow = ga.Cascade(ga.PI(0.1, 1.0), period=125e-6)
     data = DataSet.of([rec], slow)
     assert (data.substeps(None), data.substeps(slow), data.substeps(ga.PI(0.1, 1.0))) == (8, 1, 8)
+
+
+@pytest.mark.parametrize("age", [0.0, 0.25, 0.5])
+def test_a_record_that_turns_otherwise_is_the_one_loaded_with_that_angle(age: float) -> None:
+    """Torque-driven, behind a velocity of now, of a quarter of a line ago, and one that is a difference; and in the loop."""
+    found = data().aged(age)
+    p, x = parameters(COGGING)
+    names, values = p.values(x[None, :])
+    angle = np.cumsum(found.driven[0].velocity) * DT + 0.3
+    for records, loop in ((found.driven, None), (found.turned, LOOP)):
+        anew = found.load(records[0].with_channels(position=angle), 0, loop)
+        turned = found.loaded(records, loop)[0].turned(angle if loop else found.ready_angle(angle, 0))
+        runs = [one.velocities(p.structure, names, values, substeps=4) for one in (anew, turned)]
+        np.testing.assert_array_equal(*runs)
+        other = found.loaded(records, loop)[0].velocities(p.structure, names, values, substeps=4)
+        assert np.abs(runs[0] - other).max() > 1e-6, "the angle matters"

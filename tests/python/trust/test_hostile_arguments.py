@@ -124,7 +124,7 @@ CALLS: dict[str, tuple[Callable[..., Any], dict[str, Any]]] = {
     "idn.summary": (IDN.summary, {}),
     "dia.summary": (DIA.summary, {}),
     "load": (ga.load, {"path": "saved.json"}),
-    "report": (ga.report, {"result": IDN, "path": "page.html"}),
+    "report": (ga.report, {"result": DIA, "path": "page.html"}),
     "to_fmu": (ga.to_fmu, {"model": ONE, "path": "drive.fmu", "dt": 1e-3, "controller": PI, "binary": False}),
     "to_fmu compiled": (ga.to_fmu, {"model": ONE, "path": "drive.fmu", "dt": 1e-3, "compiler": "gcc"}),
     "to_control": (ONE.to_control, {}),

@@ -189,8 +189,8 @@ def _score(objective: Objective, scales: Scales, model: Model) -> float:
 
     A mechanism fitted without the lag has a wrong resonance in its place, and a fit from there does not find the lag.
     So the lag is also fitted to one mass, and the resonance beside it.
-    A resonance faster than the records show is not allowed, unless the mechanism without the lag has one too: it would replace
-    the age.
+    A resonance faster than the records show would replace the age: it is allowed only where the mechanism without the lag has
+    one, too.
     Each is scored: one that leaves least without a noise filter need not do so with one.
     """
     task = Task(objective, scales, model, (), lambda message: None).under(Innovations())
