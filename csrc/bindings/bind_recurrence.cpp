@@ -84,6 +84,9 @@ py::dict recurrence(const EffectModel& model, const Clock& clock, const Loop& lo
         d["a"] = numbers(c.a, n);
         d["b"] = numbers(c.b, n + 1);
     }
+    d["bend"] = numbers(c.bend, made.two_masses ? 3 : n);
+    d["bend_of"] = numbers_of(c.bend_end[0], c.bend_end[1], c.bend_rise);
+    d["rise"] = numbers(c.rise, made.two_masses ? 3 : n);
     d["tables"] = effect_tables(made, left.effects, m);
     return d;
 }

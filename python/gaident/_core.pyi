@@ -388,6 +388,6 @@ def recurrence(model: EffectModel, clock: Clock, loop: Loop, substeps: int, top_
     """The numbers of the recurrence that simulates a model, for writing it in another language.
 
     "substeps" 0 where no effect acts, "a" and "b" then in delta = z - 1 at dt; else "effects", "a" and "b" (or "phi", "motor",
-    "coupling", "shaft" of two masses) at the substep, and "tables", of effects that look back: (torques back, share) of each
-    substep.
+    "coupling", "shaft" of two masses), "rise", "bend" and "bend_of" at the substep, and "tables", of effects that look back:
+    (torques back, share) of each substep.
     """

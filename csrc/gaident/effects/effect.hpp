@@ -15,7 +15,7 @@
 //   - command             r' = command(c, s, r)                  what the controller is asked to follow [rad/s]
 //   - controller          controller(c, pi)                      once: its limits
 //   - actuator            u' = actuator(c, u)                    the torque issued, once a control step [N m]
-//   - actuator_dynamics   T = actuator_dynamics(c, s, past, T)   its mean over the substep [N m]
+//   - actuator_dynamics   T = actuator_dynamics(c, s, past, T)   its course over the substep [N m]
 //   - torque              T' = T - torque(c, theta)              a torque that brakes, at the angle theta [rad]
 //   - torque_of_time      T' = T - torque_of_time(c, t)          one that is known by the time t [s] alone
 //   - inertia             inertia(c, theta, step)                what a change of the inertia does to the substep's equation; at the
@@ -29,7 +29,8 @@
 //   - coupling            coupling, mean_coupling, loaded_twist  a nonlinear coupling of two masses (mechanism.hpp)
 //   - hysteresis          wound, mean_wound, loaded_twist        a coupling of two masses with a memory (mechanism.hpp)
 //   - sensor              w' = sensor(c, theta, w)               the velocity as it is measured [rad/s]
-//   - sensor_dynamics     y = sensor_dynamics(c, s, w)           the same filtered, once a substep, its output kept as s.output
+//   - sensor_dynamics     y = sensor_dynamics(c, s, w, bend)     the same filtered, once a substep, its output kept as s.output;
+//                                                                bend: by how much its mean over the substep is above that of its ends
 //   - reading             y' = reading(c, y)                     the number read from it, once a sample
 //   - plant               plant(p, linear)                       the mechanism changed, linearly
 //
@@ -168,16 +169,34 @@ struct Beginning {
     R velocity, torque, command;  // rad/s, N m, rad/s
 };
 
-// e^-x and (1 - e^-x)/x for x >= 0 or infinite.
-struct Decay {
-    double power, mean;
+// A torque T over a substep h: its mean, and the rise of the straight line that has the same first moment:
+//
+//     mean = int_0^1 T(s h) ds,   rise = 12 int_0^1 (s - 1/2) T(s h) ds
+//
+// What a mechanism makes of both is off by O(h^3) where T jumps and by O(h^4) where it does not; of the mean alone, by O(h^2).
+template <class R>
+struct Course {
+    R mean, rise;
+};
 
-    explicit Decay(double x) : power(exp_of_minus(x)), mean(x < 0.5 ? series(x) : (1.0 - power) / x) {}
+// e^-x, and the mean and the rise of e^-(s x) over 0 <= s <= 1, for x >= 0 or infinite.
+struct Decay {
+    double power, mean, rise;
+
+    explicit Decay(double x)
+        : power(exp_of_minus(x)),
+          mean(x < 0.5 ? series(x) : (1.0 - power) / x),
+          rise(x < 0.5 ? rising(x) : 12.0 * ((mean - power) / x - 0.5 * mean)) {}
 
     static double series(double x) {
         double sum = 0.0;
         for (int k = 14; k >= 1; --k) sum = (1.0 - x * sum) / k;
         return sum;
+    }
+    static double rising(double x) {
+        double sum = 1.0;
+        for (int k = 14; k >= 1; --k) sum = 1.0 - x * sum * (k + 1.0) / (k * (k + 3.0));
+        return -x * sum;
     }
 };
 

@@ -142,6 +142,8 @@ constexpr EffectSet effects_in_lanes_only() {
     });
     return set;
 }
+static_assert((effects_with(Hooks::actuator_dynamics | Hooks::sensor_dynamics).bits & ~effects_in_lanes_only().bits) == 0,
+              "what has dynamics before or behind the mechanism stands apart: the loop of one candidate has no place for it");
 // Those that depend on the shaft's angle.
 constexpr EffectSet effects_that_turn() {
     EffectSet set;

@@ -118,7 +118,7 @@ concept controller = requires(C<E> c, ControllerState<double>& pi) { E::controll
 template <class E>
 concept actuator = requires(C<E> c, double x) { E::actuator(c, x); };
 template <class E>
-concept actuator_dynamics = requires(C<E> c, S<E> s, const Past& past, double x) { E::actuator_dynamics(c, s, past, x); };
+concept actuator_dynamics = requires(C<E> c, S<E> s, const Past& past, Course<double> T) { E::actuator_dynamics(c, s, past, T); };
 template <class E>
 concept torque = requires(C<E> c, double x) { E::torque(c, x); };
 template <class E>
@@ -153,7 +153,7 @@ concept hysteresis = requires(C<E> c, S<E> s, double x) {
 template <class E>
 concept sensor = requires(C<E> c, double x) { E::sensor(c, x, x); };
 template <class E>
-concept sensor_dynamics = requires(C<E> c, S<E> s, double x) { E::sensor_dynamics(c, s, x); };
+concept sensor_dynamics = requires(C<E> c, S<E> s, double x) { E::sensor_dynamics(c, s, x, x); };
 template <class E>
 concept reading = requires(C<E> c, double x) { E::reading(c, x); };
 template <class E>

@@ -32,6 +32,10 @@ struct EffectConstants {
     // ... or two masses (two_mass.hpp)
     R phi[3][3], motor[3], coupling[3];
     R KG, DG, per_scale;
+    // Of either, what is the same as a rise of the torque by 1: a torque, and so much more of the state's numbers from the second on
+    R rise[max_plant_order];
+    // The mean velocity over the substep beside that of its ends: of the state before it, the velocities at its end, the torque's rise
+    R bend[max_plant_order], bend_end[2], bend_rise;
 
     typename Effects::Coefficients<R> effects;
 

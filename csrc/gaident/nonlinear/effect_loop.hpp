@@ -64,6 +64,7 @@ public:
         if constexpr (Plant::both_ends) begin_at_load();
         if constexpr (!is_servo) pi_.s = c_.stored;
         else if (run.moving) pi_.rest(given, followed, w, c_.stored);
+        if (filtering()) before_.state = plant_.seen();
         angle_ = R(run.start_angle);
         theta_middle_ = fma(plant_.velocity(), R(0.5 * h_), angle_);
         if (looking_back_)
@@ -222,12 +223,21 @@ private:
         else return states_.template of<E>();
     }
 
-    [[gnu::always_inline]] bool filtering() const { return run_.effects.meets(effects_with(Hooks::sensor_dynamics)); }
+    // Whether an effect has dynamics before the mechanism, or behind it. In the loop of one candidate none has (effects/list.hpp).
+    [[gnu::always_inline]] bool late() const {
+        return OwnInLoop<R>::asks && run_.effects.meets(effects_with(Hooks::actuator_dynamics));
+    }
+    [[gnu::always_inline]] bool filtering() const {
+        return OwnInLoop<R>::asks && run_.effects.meets(effects_with(Hooks::sensor_dynamics));
+    }
     [[gnu::always_inline]] void filter() {
+        R bend = before_.bend(c_, plant_.seen());
         Effects::chain(measured(), [&]<class E>(R x) __attribute__((always_inline)) {
             if constexpr (hook::sensor_dynamics<E> && asks<E>)
-                if (run_.effects.has<E>()) [[likely]]
-                    return E::sensor_dynamics(c_.effects.template of<E>(), state<E>(), x);
+                if (run_.effects.has<E>()) [[likely]] {
+                    x = E::sensor_dynamics(c_.effects.template of<E>(), state<E>(), x, bend);
+                    bend = R(0.0);
+                }
             return x;
         });
     }
@@ -323,6 +333,7 @@ private:
     [[no_unique_address]] std::conditional_t<Plant::both_ends, LoadSide<R>, NoLoadSide> load_;
     R angle_, theta_ = R(0.0), theta_middle_;
     R held_ = R(0.0), friction_torque_ = R(0.0), per_beta_;
+    SeenBefore<R, Plant::capacity> before_{};  // where something filters the velocity
     [[no_unique_address]] std::conditional_t<is_servo, SampleMean<R>, std::monostate> mean_;
     std::size_t issued_ = 0;
 };

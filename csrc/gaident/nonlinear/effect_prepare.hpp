@@ -16,7 +16,7 @@ struct EffectRecord {
     int log_every = 1;                                                 // outputs are those of the first of so many samples
     double start_angle = 0.0;
     double torque_before = 0.0;  // of the open loop, before the record [N m]
-    double top_speed = 0.0;  // of the measured velocity [rad/s], for the choice of substeps
+    double top_speed = 0.0;      // of the measured velocity [rad/s], for the choice of substeps
 };
 
 // The model without the effects whose parameters are neutral, and with those that change the mechanism linearly multiplied into

@@ -102,7 +102,8 @@ template <Side side, class R>
     return T;
 }
 template <class R>
-[[gnu::noinline]] FrictionStep<R> changed_inertia(const EffectRun& run, const EffectConstants<R>& c, R theta, FrictionStep<R> step) {
+[[gnu::noinline]] FrictionStep<R> changed_inertia(const EffectRun& run, const EffectConstants<R>& c, R theta,
+                                                  FrictionStep<R> step) {
     Effects::each([&]<class E>() __attribute__((always_inline)) {
         if constexpr (hook::inertia<E>)
             if (run.effects.has<E>()) E::inertia(c.effects.template of<E>(), theta, step);

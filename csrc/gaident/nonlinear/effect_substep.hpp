@@ -9,14 +9,15 @@ namespace gaident {
 template <class R, class Plant, class Control>
 [[gnu::always_inline]] inline void EffectLoop<R, Plant, Control>::substep(int j, double t) {
     R T = held_;
-    if (run_.effects.meets(effects_with(Hooks::actuator_dynamics))) {
+    if (late()) {
         const PastTorques past{run_, width, issued_, j};
-        T = Effects::chain(T, [&]<class E>(R x) __attribute__((always_inline)) {
-            if constexpr (hook::actuator_dynamics<E>)
-                if (run_.effects.has<E>())
-                    return E::actuator_dynamics(c_.effects.template of<E>(), states_.template of<E>(), past, x);
+        const Course<R> course = Effects::chain(Course<R>{T, R(0.0)}, [&]<class E>(Course<R> x) __attribute__((always_inline)) {
+            if constexpr (hook::actuator_dynamics<E> && asks<E>)
+                if (run_.effects.has<E>()) return E::actuator_dynamics(c_.effects.template of<E>(), state<E>(), past, x);
             return x;
         });
+        before_.rise = course.rise;
+        T = plant_.risen(c_, course);
     }
     T = Effects::chain(T, [&]<class E>(R x) __attribute__((always_inline)) {
         if constexpr (hook::torque<E>)

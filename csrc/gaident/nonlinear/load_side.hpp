@@ -60,7 +60,8 @@ struct LoadSide {
 
     [[gnu::always_inline]] LoadSide(const EffectRun& run, R twist)
         : own(run),
-          dry(run.effects.meets(load_effects_with(dry_hooks)) || run.effects.meets(effects_with(Hooks::inertia)) || own.friction()),
+          dry(run.effects.meets(load_effects_with(dry_hooks)) || run.effects.meets(effects_with(Hooks::inertia)) ||
+              own.friction()),
           turning(run.effects.meets(load_effects_that_turn()) || run.effects.meets(effects_with(Hooks::inertia)) || own.there()),
           twist_at_start(twist) {}
 };

@@ -10,6 +10,28 @@
 
 namespace gaident {
 
+// A state as what filters the velocity sees it.
+template <class R, int n>
+struct Seen {
+    R x[n];
+};
+
+// A state before the substep, and the rise of its torque.
+template <class R, int n>
+struct SeenBefore {
+    Seen<R, n> state;
+    R rise = R(0.0);
+
+    // By how much the mean velocity over the substep is above that of its ends, behind which the state is `now`.
+    [[gnu::always_inline]] R bend(const EffectConstants<R>& c, const Seen<R, n>& now) {
+        R sum = c.bend_rise * rise;
+        for (int i = 0; i < n && i < 2; ++i) sum = fma(c.bend_end[i], now.x[i], sum);
+        for (int i = 0; i < n; ++i) sum = fma(c.bend[i], state.x[i], sum);
+        state = now;
+        return sum;
+    }
+};
+
 // Any linear plant, in the delta observer form of closed_loop.hpp; N its order, -1 where it is known only at run time.
 template <class R, int N>
 struct ObserverPlant {
@@ -46,6 +68,20 @@ struct ObserverPlant {
             if (i + 1 < n) free.x[i] = free.x[i] + x[i + 1];
         }
         return free;
+    }
+
+    // The torque that is the same as a course with its rise, from a state that is moved for it (but its velocity).
+    [[gnu::always_inline]] R risen(const EffectConstants<R>& c, const Course<R>& T) {
+        const int n = N >= 0 ? N : order;
+        for (int i = 1; i < n; ++i) x[i] = fma(c.rise[i], T.rise, x[i]);
+        return fma(c.rise[0], T.rise, T.mean);
+    }
+    // Of the state now.
+    [[gnu::always_inline]] Seen<R, capacity> seen() const {
+        Seen<R, capacity> now{};
+        const int n = N >= 0 ? N : order;
+        for (int i = 0; i < n; ++i) now.x[i] = x[i];
+        return now;
     }
 
     [[gnu::always_inline]] void move(const Free& free) {
@@ -86,6 +122,7 @@ struct ChangingPlant : ObserverPlant<R, -1> {
 template <class R>
 struct TwoMassPlant {
     static constexpr bool both_ends = false, remembers_friction = true, changing = false;
+    static constexpr int capacity = 3;
     R phi[3][3], motor[3], coupling[3];
     R KG, DG, per_scale;
     R x[3];      // w_M, w_L, psi
@@ -118,10 +155,17 @@ struct TwoMassPlant {
     [[gnu::always_inline]] Free without_friction(R T, R friction_before) {
         Free free{{linear(0, T), linear(1, T), linear(2, T)}};
         const auto as_it_is = [](R sum, R) __attribute__((always_inline)) { return sum; };
-        correct([&](int i) __attribute__((always_inline)) { return fnma(motor[i], friction_before, free.x[i]); }, as_it_is, as_it_is);
+        correct([&](int i) __attribute__((always_inline)) { return fnma(motor[i], friction_before, free.x[i]); }, as_it_is,
+                as_it_is);
         for (int i = 0; i < 3; ++i) free.x[i] = fma(coupling[i], correction, free.x[i]);
         return free;
     }
+
+    [[gnu::always_inline]] R risen(const EffectConstants<R>& c, const Course<R>& T) {
+        for (int i = 1; i < 3; ++i) x[i] = fma(c.rise[i], T.rise, x[i]);
+        return fma(c.rise[0], T.rise, T.mean);
+    }
+    [[gnu::always_inline]] Seen<R, 3> seen() const { return {{x[0], x[1], x[2]}}; }
 
     // The correction; end(i): where w_M, w_L and psi would come to without it; wound, mean_wound: (sum, x) with what remembers.
     template <class End, class Wound, class MeanWound>
@@ -162,7 +206,7 @@ struct LoadedTwoMassPlant : TwoMassPlant<R> {
     // The coupling's pulls the motor back by what it drives the load with,
     // so that with a unit torque at the motor beside it only the load is driven.
     R load[3];
-    R free[3];                // w_M, w_L, psi at the substep's end without friction
+    R free[3];                 // w_M, w_L, psi at the substep's end without friction
     bool correcting = false;   // whether the coupling is not linear,
     bool remembering = false;  // and remembers the way of its twist
 

@@ -117,6 +117,7 @@ def _table(dt: float, controller: PI | None, name: str, found: dict[str, Any]) -
         rows += [(key, _number(v)) for key, v in zip(("stiffness", "damping", "per_scale"), found["shaft"], strict=True)]
     else:
         rows += [("order", str(len(found["a"]))), ("a", _array(found["a"])), ("b", _array(found["b"]))]
+    rows += [(key, _array(found[key])) for key in ("rise", "bend", "bend_of") if any(found.get(key, ()))]
     effects: dict[str, Sequence[float]] = found.get("effects", {})
     if found["substeps"]:
         rows += [("substeps", str(found["substeps"])), ("h", _number(dt / found["substeps"]))]

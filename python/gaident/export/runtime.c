@@ -315,12 +315,12 @@ static double gaident_shown(const gaident_drive *k, const gaident_memory *s) {
 }
 
 /* The mean velocity over the last samples. */
-static double gaident_difference(const gaident_drive *k, gaident_memory *s, double now) {
+static double gaident_difference(const gaident_drive *k, gaident_memory *s, double now, double bend) {
     double left, all;
     int i;
     s->velocity_difference.steps += 1.0;
     s->velocity_difference.sum =
-        fma(k->velocity_difference.step, 0.5 * (s->velocity_difference.w + now), s->velocity_difference.sum);
+        fma(k->velocity_difference.step, fma(s->velocity_difference.w + now, 0.5, bend), s->velocity_difference.sum);
     s->velocity_difference.w = now;
     if (s->velocity_difference.steps > k->velocity_difference.last) {
         for (i = GAIDENT_DIFFERENCES - 1; i > 0; --i) s->velocity_difference.mean[i] = s->velocity_difference.mean[i - 1];
@@ -337,21 +337,26 @@ static double gaident_difference(const gaident_drive *k, gaident_memory *s, doub
     return s->velocity_difference.output = all * k->velocity_difference.per_samples;
 }
 
-static double gaident_track(const gaident_drive *k, gaident_memory *s, double now) {
+static double gaident_track(const gaident_drive *k, gaident_memory *s, double now, double bend) {
     const double step = now - s->velocity_observer.w, behind = s->velocity_observer.output - s->velocity_observer.w;
     const double slope = s->velocity_observer.slope;
-    s->velocity_observer.output = now + fma(k->velocity_observer.of_step, step,
-                                            fma(k->velocity_observer.of_v, slope, k->velocity_observer.of_y * behind));
-    s->velocity_observer.slope = fma(k->velocity_observer.slope_of_step, step,
-                                     fma(k->velocity_observer.slope_of_v, slope, k->velocity_observer.slope_of_y * behind));
+    s->velocity_observer.output =
+        now + fma(k->velocity_observer.of_bend, bend,
+                  fma(k->velocity_observer.of_step, step,
+                      fma(k->velocity_observer.of_v, slope, k->velocity_observer.of_y * behind)));
+    s->velocity_observer.slope =
+        fma(k->velocity_observer.slope_of_bend, bend,
+            fma(k->velocity_observer.slope_of_step, step,
+                fma(k->velocity_observer.slope_of_v, slope, k->velocity_observer.slope_of_y * behind)));
     s->velocity_observer.w = now;
     return s->velocity_observer.output;
 }
 
-static double gaident_filter(const gaident_drive *k, gaident_memory *s, double now) {
+static double gaident_filter(const gaident_drive *k, gaident_memory *s, double now, double bend) {
     const double before = k->velocity_filter.decay * s->velocity_filter.output;
     s->velocity_filter.output =
-        fma(k->velocity_filter.of_new, now, fma(k->velocity_filter.of_old, s->velocity_filter.w, before));
+        fma(k->velocity_filter.of_bend, bend,
+            fma(k->velocity_filter.of_new, now, fma(k->velocity_filter.of_old, s->velocity_filter.w, before)));
     s->velocity_filter.w = now;
     return s->velocity_filter.output;
 }
@@ -400,18 +405,24 @@ static double gaident_effects_step(const gaident_drive *k, gaident_memory *s, do
     }
     for (j = 0; j < k->substeps; ++j) {
         const double w = s->x[0];
-        double T = u, y_next;
+        double T = u, rise = 0.0, bend, before[GAIDENT_ORDER], y_next; /* T: mean of the torque, and its rise about it */
+        int i;
+        for (i = 0; i < k->order; ++i) before[i] = s->x[i];
         if (k->effects & GAIDENT_TRANSPORT_DELAY) {
             const int back = k->transport_delay.back[j], length = k->transport_delay.length;
             const double old = issued[(s->newest - back + length) % length];
             const double young = issued[(s->newest - back + (back > 0) + length) % length];
             T = fma(young - old, k->transport_delay.share[j], old);
+            rise = 6.0 * k->transport_delay.share[j] * (young - T);
         }
         if (k->effects & GAIDENT_TORQUE_LAG) {
             const double gap = s->torque_lag.T - T;
-            s->torque_lag.T = fma(gap, k->torque_lag.decay, T);
-            T = fma(gap, k->torque_lag.mean, T);
+            s->torque_lag.T = fma(rise, k->torque_lag.decay_of_rise, fma(gap, k->torque_lag.decay, T));
+            T = fma(rise, k->torque_lag.mean_of_rise, fma(gap, k->torque_lag.mean, T));
+            rise = fma(rise, k->torque_lag.rise_of_rise, gap * k->torque_lag.rise);
         }
+        T = fma(k->rise[0], rise, T);
+        for (i = 1; i < k->order; ++i) s->x[i] = fma(k->rise[i], rise, s->x[i]);
         s->at_motor.theta = s->theta;
         s->at_motor.braking = gaident_braking(&k->at_motor, s->theta);
         T += gaident_hum(&k->at_motor, s->time + 0.5 * k->h) - s->at_motor.braking;
@@ -421,9 +432,18 @@ static double gaident_effects_step(const gaident_drive *k, gaident_memory *s, do
         s->time += k->h;
         s->angle = fma(0.5 * k->h, w + s->x[0], s->angle);
         y_next = gaident_measured(k, s);
-        if (k->effects & GAIDENT_VELOCITY_DIFFERENCE) y_next = gaident_difference(k, s, y_next);
-        if (k->effects & GAIDENT_VELOCITY_OBSERVER) y_next = gaident_track(k, s, y_next);
-        if (k->effects & GAIDENT_VELOCITY_FILTER) gaident_filter(k, s, y_next);
+        /* the mean of the velocity over the substep beside that of its ends */
+        bend = fma(k->bend_of[1], s->x[1], fma(k->bend_of[0], s->x[0], k->bend_of[2] * rise));
+        for (i = 0; i < k->order; ++i) bend = fma(k->bend[i], before[i], bend);
+        if (k->effects & GAIDENT_VELOCITY_DIFFERENCE) {
+            y_next = gaident_difference(k, s, y_next, bend);
+            bend = 0.0;
+        }
+        if (k->effects & GAIDENT_VELOCITY_OBSERVER) {
+            y_next = gaident_track(k, s, y_next, bend);
+            bend = 0.0;
+        }
+        if (k->effects & GAIDENT_VELOCITY_FILTER) gaident_filter(k, s, y_next, bend);
     }
     return y;
 }

@@ -73,6 +73,8 @@ typedef struct {
     int two_masses;                        /* with a nonlinear coupling, or effects at the load: in place of a and b */
     double phi[9];                         /* e^(A h) - 1 over motor velocity, load velocity, twist to scale */
     double motor[3], coupling[3];          /* response to 1 N m at the motor, to 1 N m more in the coupling */
+    double rise[GAIDENT_ORDER];            /* as much as a torque that rises by 1 N m do: a torque, and more of x[1], x[2], ... */
+    double bend[GAIDENT_ORDER], bend_of[3]; /* of the mean velocity beside that of its ends: state before; x[0], x[1] behind; rise */
     double stiffness, damping, per_scale;  /* of the coupling [N m/rad], [N m s/rad]; twist per scaled twist */
 
     gaident_shaft at_motor, at_load;
@@ -84,12 +86,12 @@ typedef struct {
     struct { double limit; } torque_saturation;
     struct { double width; } torque_dead_band;
     struct { int length; const int *back; const double *share; } transport_delay; /* torques kept; per substep */
-    struct { double decay, mean; } torque_lag;
+    struct { double decay, mean, rise, decay_of_rise, mean_of_rise, rise_of_rise; } torque_lag;
     struct { double limit; } integrator_clamp;
     struct { double step; } command_rate_limit;
     struct { double samples, per_samples, step, last; } velocity_difference;
-    struct { double of_y, of_v, of_step, slope_of_y, slope_of_v, slope_of_step; } velocity_observer;
-    struct { double decay, of_old, of_new; } velocity_filter;
+    struct { double of_y, of_v, of_step, of_bend, slope_of_y, slope_of_v, slope_of_step, slope_of_bend; } velocity_observer;
+    struct { double decay, of_old, of_new, of_bend; } velocity_filter;
     struct { double amplitude, order, phase; } velocity_ripple;
     struct { double step; } velocity_quantisation;
 } gaident_drive;

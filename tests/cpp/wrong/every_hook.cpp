@@ -43,7 +43,7 @@ struct All {
     template <class R>
     static R actuator(const Coefficients<R>&, R);
     template <class R, class Past>
-    static R actuator_dynamics(const Coefficients<R>&, State<R>&, const Past&, R);
+    static Course<R> actuator_dynamics(const Coefficients<R>&, State<R>&, const Past&, Course<R>);
     template <class R>
     static R torque(const Coefficients<R>&, R);
     template <class R>
@@ -73,7 +73,7 @@ struct All {
     template <class R>
     static R sensor(const Coefficients<R>&, R, R);
     template <class R>
-    static R sensor_dynamics(const Coefficients<R>&, State<R>&, R);
+    static R sensor_dynamics(const Coefficients<R>&, State<R>&, R, R);
     template <class R>
     static R reading(const Coefficients<R>&, R);
 };

@@ -1,7 +1,7 @@
 // u(t - delay), any fraction of a sample.
-// A held torque delayed is still piecewise constant: over the substep [t, t + h] its mean is
+// A held torque delayed is still piecewise constant: over the substep [t, t + h] its mean and its rise are
 //
-//     (1 - v) u(k) + v u(k+1),   x = (t - delay)/T,  k = floor(x),  v = max(0, (x - k) + h/T - 1) T/h
+//     (1 - v) u(k) + v u(k+1),   6 v (1 - v) (u(k+1) - u(k)),   x = (t - delay)/T,  k = floor(x),  v = max(0, (x - k) + h/T - 1) T/h
 //
 // with T the time each torque is held.
 #pragma once
@@ -27,6 +27,7 @@ struct TransportDelay {
         int back[max_substeps], younger[max_substeps];
         double share[max_substeps];
     };
+    static constexpr bool apart = true;
     static constexpr Pace pace = Pace::fine;
     static bool possible(const double* p) { return p[0] >= 0.0 && p[0] <= longest_delay; }
     // A static change of the torque, as saturation and dead band are, commutes with a delay: the controller's delay adds to this one.
@@ -60,7 +61,7 @@ struct TransportDelay {
     }
 
     template <class None, class NoState, class Past, class R>
-    [[gnu::always_inline]] static R actuator_dynamics(const None&, NoState&, const Past& past, R) {
+    [[gnu::always_inline]] static Course<R> actuator_dynamics(const None&, NoState&, const Past& past, Course<R>) {
         const auto table = [&](std::size_t lane) -> const Table& { return past.template table<TransportDelay>(lane); };
         const auto before = [&](int back, std::size_t lane) {
             return past.torque(past.newest - static_cast<std::size_t>(back), lane);
@@ -68,7 +69,8 @@ struct TransportDelay {
         const R from = Pack<R>::gather([&](std::size_t lane) { return before(table(lane).back[past.substep], lane); });
         const R to = Pack<R>::gather([&](std::size_t lane) { return before(table(lane).younger[past.substep], lane); });
         const R share = Pack<R>::gather([&](std::size_t lane) { return table(lane).share[past.substep]; });
-        return fma(to - from, share, from);
+        const R change = to - from, mean = fma(change, share, from);
+        return {mean, R(6.0) * share * (to - mean)};
     }
 };
 

@@ -37,7 +37,8 @@ struct SquareRootDrag {
         const R zero = R(0.0), one = R(1.0), half = R(0.5);
         const R speed = absolute(step.w), way = greater(speed, zero, step.w, step.w_free);
         const R level = greater(way, zero, step.law.level_positive, step.law.level_negative);
-        R ahead = fnma(step.beta, level, greater(way, zero, step.w_free, zero - step.w_free)), b = (step.beta * half) * c.coefficient;
+        R ahead = fnma(step.beta, level, greater(way, zero, step.w_free, zero - step.w_free)),
+          b = (step.beta * half) * c.coefficient;
         if (step.law.steep) {
             const R B = greater(way, zero, step.law.viscous_positive, step.law.viscous_negative) * half;
             const R per = one / fma(step.beta, fma(step.law.drag, speed, B), one);

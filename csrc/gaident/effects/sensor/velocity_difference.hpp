@@ -2,7 +2,7 @@
 //
 //     y(n) = (theta(n) - theta(n-k))/(k T) = 1/k (m_0 + m_1 + ... + m_(k-1)),   m_i the mean velocity over the sample i samples ago
 //
-// m by the trapezoidal rule over the substeps.
+// m of the substeps' means.
 // Within a sample, where the continuous loop reads it, the difference slides: of the sample that leaves it a part p_i is left,
 // and of the sample that has begun, j of m substeps are there,
 //
@@ -50,9 +50,9 @@ struct VelocityDifference {
     }
 
     template <class R>
-    [[gnu::noinline]] static R sensor_dynamics(const Coefficients<R>& c, State<R>& s, R w_next) {
+    [[gnu::noinline]] static R sensor_dynamics(const Coefficients<R>& c, State<R>& s, R w_next, R bend) {
         s.steps = s.steps + R(1.0);
-        s.sum = fma(c.step, (s.w + w_next) * R(0.5), s.sum);
+        s.sum = fma(c.step, fma(s.w + w_next, R(0.5), bend), s.sum);
         s.w = w_next;
         if (all_above(s.steps, c.last)) {
             // Written out, so that no call of the C library takes its place: how many instructions that has depends on the processor.

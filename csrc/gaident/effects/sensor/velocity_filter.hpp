@@ -1,6 +1,7 @@
-// The measured velocity's filter 1/(1 + s tau), exact for a velocity that is linear over the substep, x = h/tau:
+// The measured velocity's filter 1/(1 + s tau), exact for a velocity that is a parabola over the substep, 6 bend s (1 - s) beside the
+// straight line between its ends, s from 0 to 1, x = h/tau:
 //
-//     y+ = e^-x y + (1 - e^-x - c) w + c w+,   c = 1 - (1 - e^-x)/x
+//     y+ = e^-x y + (1 - e^-x - c) w + c w+ + b bend,   c = 1 - (1 - e^-x)/x,   b = -12 int (s - 1/2) e^-(s x) ds
 #pragma once
 
 #include "../effect.hpp"
@@ -19,16 +20,17 @@ struct VelocityFilter {
 
     template <class R>
     struct Coefficients {
-        R decay, of_old, of_new;  // e^-x, 1 - e^-x - c, c
+        R decay, of_old, of_new, of_bend;  // e^-x, 1 - e^-x - c, c, b
     };
     template <class R>
     struct State {
         R output, w;  // rad/s
     };
+    static constexpr bool apart = true;
     static constexpr Pace pace = Pace::fine;
     static void prepare(const double* p, const PreparedFor& time, Coefficients<double>& c) {
         const Decay decay(time.step / p[0]);
-        c = {decay.power, decay.mean - decay.power, 1.0 - decay.mean};
+        c = {decay.power, decay.mean - decay.power, 1.0 - decay.mean, -decay.rise};
     }
     template <class R>
     static void begin(const Coefficients<R>&, State<R>& s, const Beginning<R>& start) {
@@ -36,8 +38,8 @@ struct VelocityFilter {
     }
 
     template <class R>
-    [[gnu::always_inline]] static R sensor_dynamics(const Coefficients<R>& c, State<R>& s, R w_next) {
-        s.output = fma(c.of_new, w_next, fma(c.of_old, s.w, c.decay * s.output));
+    [[gnu::always_inline]] static R sensor_dynamics(const Coefficients<R>& c, State<R>& s, R w_next, R bend) {
+        s.output = fma(c.of_bend, bend, fma(c.of_new, w_next, fma(c.of_old, s.w, c.decay * s.output)));
         s.w = w_next;
         return s.output;
     }
