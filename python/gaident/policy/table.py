@@ -264,6 +264,9 @@ class Decisions:
         "by which a jump between two lines comes before the later one at least; half a one is other things",
         SLOWER,
     )
+    jump_misread: float = loop(
+        0.05, "1", "of the jumps on the lines, which look as if they came early: 11 of 335 in a log of a fast resonance", SLOWER
+    )
     told_time: float = loop(
         0.25, "samples", "deviation of a jump's time that the torque alone tells; else the velocity has to", SLOWER
     )

@@ -92,6 +92,18 @@ def _timed(rec: Record, controller: Controller) -> Record:
     return rec if not_followed([found], controller) else found
 
 
+def _on_the_lines(early: NDArray[np.bool_], every: int) -> bool:
+    """Whether all jumps fell on the lines, of which the torque shows so many early by a sample, and the others not.
+
+    A jump at any of the `every` samples falls on the line with the probability 1/every.
+    One on the line looks early with the probability `jump_misread`, as what the velocity does behind it is not known.
+    The hypothesis under which what was seen is more likely holds.
+    """
+    count, misread, anywhere = int(np.sum(early)), POLICY.jump_misread, 1.0 / every
+    on_lines = len(early) - count
+    return bool(on_lines * np.log((1.0 - misread) / anywhere) + count * np.log(misread / (1.0 - anywhere)) >= 0.0)
+
+
 class _Seen(NamedTuple):
     """weight, right (m,): what is added to the normal equations of the shares, on the diagonal and to the right.
 
@@ -155,12 +167,11 @@ class _Timing:
     def solved(self) -> Vector | None:
         """The command at the samples (n, r); None where its lines explain the torque as well.
 
-        Jumps fall on samples: where none of those that the torque tells came early by one, all of them fell on the lines.
-        Half a sample is the age of a velocity, or another rule of integration.
+        Jumps fall on samples; half a sample is the age of a velocity, or another rule of integration.
         """
         found = self.shares()
-        jumps = found.told & self.unsure.jump
-        if np.any(self.unsure.jump) and np.all(found.share[jumps] * (self.unsure.every - 1) < POLICY.jumped_early):
+        early = found.share * (self.unsure.every - 1) >= POLICY.jumped_early
+        if np.any(self.unsure.jump) and _on_the_lines(early[found.told & self.unsure.jump], self.unsure.every):
             bends = self.unsure.with_jumps_on_lines()
             if not len(bends.at):
                 return None
