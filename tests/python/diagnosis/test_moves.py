@@ -784,6 +784,20 @@ def test_elsewhere_looks_for_the_resonance_of_two_masses_beside_their_effects(mo
     assert bench.space.elsewhere(bench.fit(A, FAR)) == []
 
 
+def test_two_masses_that_leave_more_than_noise_are_tried_behind_a_lag(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(mechanisms, "LIBRARY", LIBRARY)
+    late = replace(LAG, late=True, place="actuator")
+    bench = Bench({"lag": (1.5,)}, masses=2, allowed=(A, late))
+    without = bench.fit(A)
+    found = bench.space.behind_a_lag(without)
+    assert found.effects == ("a", "lag") and found.x[-1] == pytest.approx(1.5, abs=0.02)
+    assert bench.space.score(found) < bench.space.score(without)
+    for fit in (bench.fit(A, masses=1), bench.fit(A, FAR), bench.fit(late), found):
+        assert bench.space.behind_a_lag(fit) is fit, "no shaft, effects behind it, a lag that is there, or nothing left"
+    none = replace(bench.space, allowed=(A,))
+    assert none.behind_a_lag(without) is without
+
+
 def test_dry_friction_is_tried_at_both_ends() -> None:
     bench = Bench({"near": (0.5,), "far": (0.6,)}, masses=2, allowed=(NEAR, A), plain=True)
     assert ("near", "far") in names(bench.space.at_the_load(bench.fit(NEAR), [bench.fit(NEAR, A)]))

@@ -54,18 +54,41 @@ class Repeated(SideMoves):
 
         An extra resonance or an effect of the shaft is left out: it may replace a resonance at the wrong place.
         """
+        bare = self.as_one(fit)
+        return [] if bare is None or not bare[0].parameters.terms else self.on_its_shaft(*bare, resonance(fit))
+
+    def as_one(self, fit: Fit) -> tuple[Hypothesis, Vector] | None:
+        """Two masses as one with their effects but those of the shaft; None without a shaft, and with effects behind it."""
         bare, x = fit.hypothesis, fit.x
         for t in fit.parameters.terms:
             if t.in_coupling or t.resonates:
                 x, bare = bare.parameters.removed(x, t.name), bare.without(t.name)
-        if fit.parameters.masses == 1 or not bare.parameters.terms or any(t.at_load for t in bare.parameters.terms):
-            return []
-        bare, x = as_one_mass(replace(fit, hypothesis=bare, x=x))
+        if fit.parameters.masses == 1 or any(t.at_load for t in bare.parameters.terms):
+            return None
+        return as_one_mass(replace(fit, hypothesis=bare, x=x))
+
+    def on_its_shaft(self, bare: Hypothesis, x: Vector, known: float = 0.0) -> list[Fit]:
+        """One mass with its effects, refitted, as two masses with the best resonance that is not the known one [rad/s]."""
         one = ls.fit(self.objective, bare, x, WHITE, self.policy.usual)
-        starts = on_a_shaft(self.objective, one, resonance(fit)) if one.cost < WORST else []
+        starts = on_a_shaft(self.objective, one, known) if one.cost < WORST else []
         short = [ls.fit(self.objective, h, x, WHITE, self.policy.short) for h, x in starts]
         best = min(short, key=lambda f: f.cost, default=None)
         return [] if best is None else [self.refitted(best.hypothesis, best.x, self.policy.long)]
+
+    def behind_a_lag(self, fit: Fit) -> Fit:
+        """The fit or, where it leaves more than noise and that scores better, two masses with its effects behind a lag.
+
+        A shaft that is fitted without the lag has another resonance, which makes up for it, and a fit from there does not return.
+        So the lag is fitted to one mass, and the resonance is searched beside it.
+        """
+        lag = next((t for t in self.allowed if t.late), None)
+        if lag is None or self.quiet(fit) or any(t.in_series for t in fit.parameters.terms) or (one := self.as_one(fit)) is None:
+            return fit
+        bare, x = one
+        longer = bare.extended(lag)
+        X = np.array([bare.parameters.inserted(x, np.array(row)) for row in lag.starts(fit.parameters.scales)])
+        start = X[int(np.argmin(self.objective.costs(longer, X, WHITE)))]
+        return min((fit, *self.on_its_shaft(longer, start)), key=self.score)
 
     def restarted(self, fit: Fit, term: Term) -> Fit:
         """The best fit from an effect's starts beside the present rest: its first fit began beside other values of the rest."""

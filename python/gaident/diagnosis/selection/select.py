@@ -297,9 +297,10 @@ def _improved(space: Moves, other: Fit, best: Fit) -> Fit:
 def _as_innovations(space: Moves, fit: Fit) -> Fit:
     """A model selected by output errors under a noise model of its own, under the predictors that may say more.
 
-    A prefilter shows no fast resonance: whitened errors do, and it is looked for again.
+    A prefilter shows no fast resonance, nor a lag beside it: whitened errors do, and they are looked for again.
     """
-    return space.with_best_resonance(space.finished(ls.reestimated(space.objective, ls.scored(space.objective, fit))))
+    found = space.with_best_resonance(space.finished(ls.reestimated(space.objective, ls.scored(space.objective, fit))))
+    return space.behind_a_lag(found)
 
 
 def specification(space: Moves, task: Task, fit: Fit) -> Specification:
