@@ -35,7 +35,7 @@ SOURCES := pyproject.toml CMakeLists.txt LICENSE README.md \
 ifndef SIDE_BY_SIDE
 .NOTPARALLEL:
 endif
-.PHONY: help install demo test fuzz bench real embedded wheel windows tidy docs lint test-cpp test-python clean build-checked test-checked test-sanitized
+.PHONY: help install demo test fuzz bench real embedded wheel windows tidy docs lint test-cpp test-python test-long clean build-checked test-checked test-sanitized
 .DEFAULT_GOAL := help
 
 help: ## list the commands
@@ -47,7 +47,7 @@ demo: .venv/.installed ## identify a two-mass drive, find a hidden friction; tex
 	@$(BIN)/gaident demo --out "$(DEMO_DIR)"
 
 # What comes from the network beside what needs the compiler, then the tests.
-test: ## every test, C++ and Python
+test: ## the tests, C++ and Python, but for the long ones
 	@$(MAKE) --no-print-directory --jobs=2 --output-sync=target SIDE_BY_SIDE=yes .venv/.requirements build-checked
 	@$(MAKE) --no-print-directory test-checked test-python
 
@@ -71,8 +71,13 @@ test-sanitized: .venv/.tools ## the C++ tests again under AddressSanitizer and U
 	$(BIN)/cmake --build build/sanitized --target all all_verify_interface_header_sets
 	$(CTEST) build/sanitized
 
+PYTEST := $(BIN)/python -m pytest -n $(JOBS) --dist worksteal
+
 test-python: .venv/.tested
-	$(BIN)/python -m pytest -n $(JOBS) --dist worksteal
+	$(PYTEST) -m "not long"
+
+test-long: .venv/.tested ## the Python tests that take more than two seconds each: whole diagnoses, some twenty minutes
+	$(PYTEST) -m long
 
 fuzz: .venv/.tested ## damaged files of every format and tables with known values, some minutes (docs/trust.md); FUZZ_FLAGS, ORACLE_FLAGS
 	$(BIN)/python tests/fuzz/run.py --workers $(JOBS) $(FUZZ_FLAGS)

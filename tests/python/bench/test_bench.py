@@ -127,6 +127,7 @@ def test_a_difference_equation_runs_freely_as_it_was_made(compare_methods: Modul
     assert np.all(np.isinf(unstable[-10:]))
 
 
+@pytest.mark.long
 def test_the_comparison_judges_on_the_rig(compare_methods: ModuleType) -> None:
     """The extended model reaches the noise of 0.3 rad/s on the record that it has not seen; linear models do not."""
     task = next(t for t in compare_methods.all_tasks() if t.name == "rig, one mass")

@@ -48,12 +48,14 @@ def diagnosed(
 KNOWN = set(LIBRARY)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("effect", [e for e in EFFECTS if e not in CLASSES and e in KNOWN])
 def test_a_hidden_effect_is_named(effect: str) -> None:
     judged = diagnosed((effect,), torque=EFFECTS.index(effect) % 2 == 0)
     assert judged.exact, judged
 
 
+@pytest.mark.long
 def test_a_cause_that_output_errors_do_not_show_is_looked_for_in_whitened_ones() -> None:
     """Without a torque, a late loop leaves an error so large and slow that under output errors no effect is worth its penalty."""
     judged = diagnosed(("transport_delay",), noise="coloured", torque=False, seed=131000002)
@@ -69,6 +71,7 @@ def test_a_member_of_a_class_is_reported_and_nothing_else(effect: str) -> None:
     assert judged.in_set and not judged.wrong and not judged.extra, judged
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("torque", [True, False])
 @pytest.mark.parametrize("effect", EQUIVALENT)
 def test_lag_and_filter_are_reported_and_never_told_apart(effect: str, torque: bool) -> None:
@@ -77,6 +80,7 @@ def test_lag_and_filter_are_reported_and_never_told_apart(effect: str, torque: b
     assert judged.equivalents_together and not judged.named, judged
 
 
+@pytest.mark.long
 def test_a_load_and_uneven_dry_friction_are_never_told_apart() -> None:
     """Tc sign(w) + T is the same torque as friction of two levels."""
     *_, controller, truth = random_case(SEED, ("coulomb_friction",), factor=1.0)
@@ -101,6 +105,7 @@ STEP_CLASSES = {
 }
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("members", STEP_CLASSES.values(), ids=STEP_CLASSES.keys())
 def test_on_a_single_step_no_wrong_name(members: tuple[str, ...]) -> None:
     for effect in members:
@@ -113,6 +118,7 @@ WALKS = "this walk has a trend that is called a drift of friction; what is left 
 MISSES = {"random_walk_friction": pytest.mark.xfail(reason=WALKS, strict=True)}
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("effect", [pytest.param(name, marks=MISSES.get(name, ())) for name in OUTSIDE])
 def test_what_the_library_does_not_know_gets_no_name(effect: str) -> None:
     judged = diagnosed((effect,), factor=1.5)
@@ -121,6 +127,7 @@ def test_what_the_library_does_not_know_gets_no_name(effect: str) -> None:
     assert judged.verdict in ("unexplained", "partly explained"), judged
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("kind", ["multi", "step", "move"])
 @pytest.mark.parametrize("noise", ["white", "encoder", "coloured"])
 def test_nothing_is_named_where_nothing_is_hidden(kind: str, noise: str) -> None:
@@ -131,24 +138,28 @@ def test_nothing_is_named_where_nothing_is_hidden(kind: str, noise: str) -> None
             assert judged.verdict == "adequate", judged
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("pair", [("coulomb_friction", "transport_delay"), ("cogging", "quadratic_drag")])
 def test_two_effects_are_both_found(pair: tuple[str, str]) -> None:
     judged = diagnosed(pair)
     assert judged.in_set and not judged.wrong and len(judged.sets) == 2, judged
 
 
+@pytest.mark.long
 def test_two_effects_of_which_none_is_a_first_step_are_both_found() -> None:
     """Without the friction a lag passes for a delay; without the lag the friction passes for noise."""
     judged = diagnosed(("coulomb_friction", "torque_lag"), noise="encoder", seed=21000001)
     assert judged.in_set and not judged.wrong and len(judged.sets) == 2, judged
 
 
+@pytest.mark.long
 def test_a_lag_is_no_delay_with_a_resonance() -> None:
     """A delay is the first step, a delay with an extra resonance the next; the lag alone explains more."""
     judged = diagnosed(("velocity_filter",), noise="encoder", torque=False, seed=40000000)
     assert judged.in_set and not judged.wrong and len(judged.sets) == 1, judged
 
 
+@pytest.mark.long
 def test_small_effects_beside_a_gap_are_not_named() -> None:
     """A cogging steers the impacts by 140 BIC units, and makes held-out data better."""
     judged = diagnosed(("backlash",), noise="coloured", seed=31000003)

@@ -139,6 +139,7 @@ def test_the_file_of_what_was_measured_is_about_rows_of_the_policy(tables: Modul
         assert m["unchanged"][0] <= m["value"] <= m["unchanged"][1] and 0 < m["used"] <= m["cases"], m["name"]
 
 
+@pytest.mark.long
 def test_a_row_is_measured_and_what_is_there_is_not_run_again(tmp_path: Path) -> None:
     """Windings are fast; and where the watched run says that no decision changes, running with the other value agrees."""
     out = tmp_path / "rows.jsonl"

@@ -61,6 +61,7 @@ def emps_force(dia: ga.Diagnosis, v: Vector, a: Vector) -> Vector:
     return np.asarray(mass * a + viscous * v + np.where(v > 0.0, positive, np.where(v < 0.0, negative, 0.0)))
 
 
+@pytest.mark.long
 def test_emps_dry_and_direction_dependent_friction_are_the_cause(emps: ga.Diagnosis) -> None:
     (cause,) = emps.causes
     assert cause.effect == "asymmetric_friction" and cause.named
@@ -126,6 +127,7 @@ def test_emps_is_searched_in_bounded_work(emps: ga.Diagnosis) -> None:
     assert emps.samples == 24841 and emps.simulations < 45_000  # 8 s of one core; on all samples throughout it were 60
 
 
+@pytest.mark.long
 def test_hsm150_inertia_dry_friction_and_the_encoder(data_dir: Path) -> None:
     """Commanded torque, one direction: dry friction is found, and what it cannot be told from is said with it."""
     from scipy.io import loadmat
@@ -144,6 +146,7 @@ def test_hsm150_inertia_dry_friction_and_the_encoder(data_dir: Path) -> None:
     assert "asymmetric_friction" in dia.not_testable
 
 
+@pytest.mark.long
 def test_rack_and_pinion_friction_and_load_are_not_separable(data_dir: Path) -> None:
     """The speed never changes its sign."""
     path = folder(data_dir, "rack_pinion") / "a3MR.csv"

@@ -57,6 +57,7 @@ def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path
 
 
+@pytest.mark.long
 def test_lengths_of_the_log_are_angles_of_the_motor(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
     arguments = ["diagnose", "run1.csv", "--validation", "run2.csv", "--drive", "drive.toml"]
     assert main([*arguments, "--json"]) == 0

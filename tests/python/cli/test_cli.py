@@ -165,6 +165,7 @@ def test_help_and_version(capsys: pytest.CaptureFixture[str]) -> None:
         assert max(map(len, out.splitlines())) <= 110
 
 
+@pytest.mark.long
 def test_demo_without_measured_data(here: Path, capsys: pytest.CaptureFixture[str], monkeypatch: Any) -> None:
     monkeypatch.delenv("GAIDENT_DATA", raising=False)
     assert main(["demo"]) == 0

@@ -31,6 +31,7 @@ def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path
 
 
+@pytest.mark.long
 def test_it_says_what_is_wrong_and_writes_files(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
     names = ("--out", "dia.json", "--plot", "dia.png", "--next-command", "next.csv")
     assert main(["diagnose", "run0.csv", "--validation", "run1.csv", *LOOP, *names]) == 0
@@ -49,6 +50,7 @@ def test_it_says_what_is_wrong_and_writes_files(here: Path, capsys: pytest.Captu
     assert "contains no identification" in refusal(["diagnose", "run0.csv", *LOOP, "--model", "dia.json"], capsys)
 
 
+@pytest.mark.long
 def test_variations_of_the_log_are_printed_and_stand_in_the_page(
     here: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -72,6 +74,7 @@ def test_variations_of_the_log_are_printed_and_stand_in_the_page(
     assert "stability" not in json.loads(capsys.readouterr().out) and len(asked) == 2
 
 
+@pytest.mark.long
 def test_a_log_whose_name_is_no_utf_8(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """Named in Latin-1: it ended as an internal error behind all the work."""
     os.rename("run0.csv", b"Achse_\xe9.csv")

@@ -14,6 +14,7 @@ from gaident.cli import main
 from gaident.data import differentiate
 
 
+@pytest.mark.long
 def test_demo_with_measured_data(here: Path, data_dir: Path, capsys: Any, monkeypatch: Any) -> None:
     monkeypatch.setenv("GAIDENT_DATA", str(data_dir))
     assert main(["demo", "--json", "--out", "new/folder"]) == 0
@@ -54,6 +55,7 @@ def test_emps_axis_falsifies_the_linear_model(here: Path, data_dir: Path, capsys
         assert "NOT TO BE TRUSTED" in out
 
 
+@pytest.mark.long
 def test_hsm150_runs_together_falsify_the_linear_model(here: Path, data_dir: Path, capsys: Any) -> None:
     logs = sorted(str(path) for path in (data_dir / "hsm150").glob("idf_pos_*.mat"))
     assert len(logs) == 6

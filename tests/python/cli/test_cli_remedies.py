@@ -32,6 +32,7 @@ def here(result: ga.Diagnosis, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) 
     return tmp_path
 
 
+@pytest.mark.long
 def test_retune_prints_and_saves(here: Path, result: ga.Diagnosis, capsys: pytest.CaptureFixture[str]) -> None:
     options = ["run.json", "--dt", "1e-3", "--step", "50", "--phase-margin", "55", "--torque-limit", "60"]
     assert main(["retune", *options, "--out", "gains.json", "--plot", "loop.png"]) == 0

@@ -95,6 +95,7 @@ def behind_a_current_loop(seed: int) -> ga.Record:
     return ga.Record(log.dt, command=log.command, velocity=log.velocity, torque=log.torque)
 
 
+@pytest.mark.long
 def test_one_mass_behind_a_current_loop_gets_no_second_one_where_the_rule_was_not_given() -> None:
     """Two masses leave less before whitening, whose zero lies to the right; with its own noise filter one mass and its lag do."""
     rec = behind_a_current_loop(3)
@@ -112,6 +113,7 @@ def test_torques_that_are_alike_at_the_top_are_no_limit_where_the_rule_alone_mak
     assert said.cause == "integration_rule" and "limit" not in said.sentence
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("first", [0, 150])
 def test_its_age_is_asked_in_motion_too_where_the_torque_of_each_sample_is_logged(first: int) -> None:
     controller = ga.PI(0.1, 5.0, rule="backward")
@@ -143,6 +145,7 @@ def test_free_runs_are_closed_over_what_the_torque_does_not_tell() -> None:
     assert closed_over(faster, [log]) is faster and closed_over(faster, [moving]) is None
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("seed", [0, 2])
 def test_friction_and_gravity_do_not_hide_the_age_nor_what_kind_of_lag_there_is(seed: int) -> None:
     """Seed 0 had a Stribeck friction and seed 2 a transport delay on a second mass for the lag of a current loop."""

@@ -48,6 +48,7 @@ def shown(rec: ga.Record, every: int) -> Any:
         return form_shown([rec], GIVEN, every=every)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("every", [2, 4])
 @pytest.mark.parametrize("name", LOOPS)
 def test_the_form_is_found_with_the_times(name: str, every: int) -> None:
@@ -63,6 +64,7 @@ def test_the_form_is_found_with_the_times(name: str, every: int) -> None:
     assert isinstance(known, TimedRecord)
 
 
+@pytest.mark.long
 def test_a_record_longer_than_the_regression_reads() -> None:
     """More samples of the controller than `searched_samples`: the jumps of the lines that it reads are looked for, no others."""
     whole = np.concatenate([levels(8, 30 + k) for k in range(9)])
@@ -72,6 +74,7 @@ def test_a_record_longer_than_the_regression_reads() -> None:
     assert found is not None and set(found.numbers) == set(expected)
 
 
+@pytest.mark.long
 def test_eight_samples_to_a_line() -> None:
     for name in ("backward", "IP", "low pass"):
         loop, expected = LOOPS[name]

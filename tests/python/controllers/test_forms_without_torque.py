@@ -30,6 +30,7 @@ def record(controller: ga.Cascade, friction: float = 0.0) -> ga.Record:
     return rig(plant, levels, effects, Noise(white=0.03), seed=2, torque_logged=False)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("controller", "form", "numbers"),
     [
@@ -59,12 +60,14 @@ def test_a_filter_that_was_not_given_is_found_and_is_no_mechanics(
     assert "nothing shows it: log the torque" in said and "The logged torque" not in said
 
 
+@pytest.mark.long
 def test_a_filter_is_found_beside_friction() -> None:
     dia = ga.diagnose(record(ga.Cascade(PI, velocity_filters=(ga.LowPass(2e-3),)), friction=0.05), PI)
     assert {f.effect for f in dia.causes} == {"velocity_feedback_filter", "coulomb_friction"}, dia.summary()
     assert dia.mechanics["inertia"].value == pytest.approx(J, rel=5e-3)
 
 
+@pytest.mark.long
 def test_an_ip_controller_is_found_although_it_looks_like_a_lag_and_more_damping() -> None:
     """On one mass an IP loop is to its command what a PI loop with a lag of kp/ki on a more damped mass is."""
     dia = ga.diagnose(record(ga.Cascade(ga.PI(KP, KI, command_weight=0.0))), PI)
@@ -75,6 +78,7 @@ def test_an_ip_controller_is_found_although_it_looks_like_a_lag_and_more_damping
     assert abs(inertia.value - J) < 3.0 * inertia.std < 0.01 * J
 
 
+@pytest.mark.long
 def test_a_notch_at_the_resonance_of_two_masses_is_found() -> None:
     """The mechanism that is found under the bare PI has an inertia that is far off; the one under the notch is found anew."""
     notch = ga.Notch(29.0, numerator_damping=0.07, denominator_damping=0.7)

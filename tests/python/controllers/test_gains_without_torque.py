@@ -37,6 +37,7 @@ def test_right_gains_cost_a_clean_record_nothing_and_what_cannot_show_is_said() 
     assert not any("nothing shows it" in note for note in ga.diagnose(record(logged=True), TRUE).notes)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("friction", [0.0, FRICTION])
 @pytest.mark.parametrize("wrong", [0.85, 1.15])
 def test_a_wrong_ratio_of_the_gains_is_found_and_is_no_mechanics(wrong: float, friction: float) -> None:
@@ -55,6 +56,7 @@ def test_a_wrong_ratio_of_the_gains_is_found_and_is_no_mechanics(wrong: float, f
         assert dia.causes[1].parameters["torque"].value == pytest.approx(FRICTION, rel=0.01)
 
 
+@pytest.mark.long
 def test_a_given_identification_is_not_replaced_in_silence() -> None:
     """And the gain of a second round counts against the model under the given gains, not against that of the first round."""
     rec, given = record(), ga.PI(TRUE.kp, 0.85 * TRUE.ki)
@@ -81,6 +83,7 @@ def test_what_gains_would_explain_as_well_has_them_beside_its_name() -> None:
     assert any("Other gains than the given ones would explain these records as well" in note for note in dia.notes)
 
 
+@pytest.mark.long
 def test_a_cause_that_gains_cannot_imitate_stays_a_sole_name() -> None:
     """A search under other gains comes to the cause as well; under the given ones it explains as much."""
     rec, validation, controller, truth = random_case(21, "stribeck_friction", torque_logged=False)
@@ -101,6 +104,7 @@ def test_a_position_loop_without_a_logged_torque_is_diagnosed() -> None:
     assert any("coulomb_friction" in (f.effect, *f.alternatives) for f in dia.causes), dia.summary()
 
 
+@pytest.mark.long
 def test_a_record_with_a_torque_shows_the_gains_of_those_without() -> None:
     logged, unlogged = record(FRICTION, logged=True), record(FRICTION)
     given = ga.PI(0.9 * TRUE.kp, 1.15 * TRUE.ki)

@@ -97,6 +97,7 @@ def test_a_torque_limit_hides_no_lag(begin: int) -> None:
     assert lag_shown([record(0.0, pi=limited)[begin:]], limited) is None
 
 
+@pytest.mark.long
 def test_a_lag_of_the_measured_current_is_not_said_to_be_other_gains() -> None:
     dia = ga.diagnose(record(LAG), PI)
     assert [f.effect for f in dia.causes] == ["coulomb_friction", "torque_lag"], dia.summary()

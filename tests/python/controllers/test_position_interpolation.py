@@ -60,6 +60,7 @@ def test_a_smooth_profile_has_no_corners() -> None:
     assert np.array_equal(found[::EVERY], whole[::EVERY])
 
 
+@pytest.mark.long
 def test_where_the_torque_shows_a_profile_the_position_command_is_no_staircase() -> None:
     rec = record({"coulomb_friction": {"torque": 0.3}})
     smooth = ga.Cascade(ga.PI(0.3, 15.0), T, position=ga.P(30.0), velocity_feedforward=1.0, interpolation="smooth")
@@ -75,6 +76,7 @@ def test_where_the_torque_shows_a_profile_the_position_command_is_no_staircase()
     assert dia.mechanics["inertia"].value == pytest.approx(AXIS.J, rel=1e-3)
 
 
+@pytest.mark.long
 def test_a_feedforward_that_was_not_given_is_found_beside_the_way_of_the_command() -> None:
     rec = record({})
     bare = ga.Cascade(ga.PI(0.3, 15.0), T, position=ga.P(30.0))
@@ -168,6 +170,7 @@ def test_steps_are_held_and_bent_curves_go_straight_between_the_lines() -> None:
     assert np.array_equal(between_lines(np.arange(4.0), 4)[:12], np.arange(12.0) / 4.0), "too short for a bend"
 
 
+@pytest.mark.long
 def test_a_ramp_whose_bends_lie_between_the_lines_is_no_cause() -> None:
     """Two masses behind a current loop, 1 kHz of 4 kHz: a straight line through the bends named a delay, J 7 % off."""
     skip_without_library()

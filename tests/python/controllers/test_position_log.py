@@ -121,6 +121,7 @@ def test_friction_is_found_without_velocity_and_torque(tmp_path: Path) -> None:
     assert not dia.torque_logged and "The logged torque" not in said
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("torque", [False, True])
 def test_a_second_mass_is_found_whose_friction_is_at_the_load(torque: bool) -> None:
     """With the friction at the motor a shaft explains nothing, so that neither of the two helps alone.
@@ -223,6 +224,7 @@ def test_a_velocity_made_of_the_position_is_that_which_the_drive_read(every: int
     assert is_difference_at_clock(moved, position[::every], every * T, every, ~outlier)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("every", [1, 4])
 def test_friction_of_a_log_of_position_and_torque_is_named_alone(every: int) -> None:
     """A mean over the line before it, or over two, is no velocity of this drive: names of couplings and resonances followed."""
@@ -235,6 +237,7 @@ def test_friction_of_a_log_of_position_and_torque_is_named_alone(every: int) -> 
     assert dia.digests == (rec.digest,) and dia.records == (rec,)
 
 
+@pytest.mark.long
 def test_two_masses_of_such_a_log_are_no_finding() -> None:
     rec = servo_log(4, {}, JL=1e-3, DL=1e-3, KG=300.0, DG=0.02)
     dia = ga.diagnose(rec, SERVO)

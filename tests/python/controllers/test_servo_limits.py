@@ -43,6 +43,7 @@ HIDDEN = {
 }
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("effect", HIDDEN)
 @pytest.mark.parametrize("every", [1, 4])
 def test_a_hidden_limit_is_named(effect: str, every: int) -> None:
@@ -117,6 +118,7 @@ def test_the_replay_has_limits(name: str, limits: dict[str, float]) -> None:
     assert np.abs(free - u)[:known].max() > 1e-3
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("noise", [0.0, 0.02])
 @pytest.mark.parametrize("known", [True, False])
 def test_a_limit_that_a_slow_log_shows_is_said_and_the_gains_are_as_sure_as_they_are(noise: float, known: bool) -> None:

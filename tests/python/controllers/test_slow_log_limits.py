@@ -29,6 +29,7 @@ def case(loop: str, every: int, noise: str, *effects: str, seed: int = SEED) -> 
     return random_case(seed, effects, loop_kind(loop), loop_noise(noise, seed), True, None, plant, plant.placed)
 
 
+@pytest.mark.long
 def test_one_limit_goes_before_a_form_of_several_numbers_that_explains_less() -> None:
     rec, _, controller, truth = case("bare", 4, "encoder", "integrator_clamp")
     assert loop_of([rec], controller).findings == ()
@@ -38,6 +39,7 @@ def test_one_limit_goes_before_a_form_of_several_numbers_that_explains_less() ->
     assert abs(limit.value - truth.effects["integrator_clamp"]["limit"]) < 3.0 * limit.std < 0.03 * limit.value
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("noise", ["white", "encoder"])
 def test_the_flat_top_of_a_swing_is_no_limit_where_the_torque_follows_without(noise: str) -> None:
     rec, later, controller, truth = case("bare", 2, noise, "backlash", seed=953)
@@ -58,6 +60,7 @@ def test_an_integral_held_at_a_limit_is_open_by_what_it_moves_between_two_lines(
     assert not_followed([rec.with_channels(torque=rec.torque + 0.01 * (rec.time > 0.5 * rec.time[-1]))], controller)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("loop", "noise"), [("backward", "white"), ("velocity filter", "encoder")])
 def test_outliers_of_a_slow_log_are_not_what_its_controller_read(loop: str, noise: str) -> None:
     rec, _, controller, truth = case(loop, 4, noise, "outliers")

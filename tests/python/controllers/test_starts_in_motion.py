@@ -59,6 +59,7 @@ def test_the_torque_goes_between_the_lines_as_the_controller_makes_it() -> None:
     np.testing.assert_allclose(driven_by(log, other).torque[:-1], straight[:-1], atol=1e-12)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("effect", ["", "transport_delay", "coulomb_friction"])
 @pytest.mark.parametrize("every", [4, 8])
 def test_nothing_is_named_that_is_not_there(every: int, effect: str) -> None:

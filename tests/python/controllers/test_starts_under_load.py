@@ -112,6 +112,7 @@ def test_a_torque_is_made_with_what_the_integrator_stored() -> None:
         assert case(loop, 1)[1].torque_of(still, stored=LOAD) == pytest.approx(np.full(20, LOAD), rel=1e-12)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("loop", "every"), [("IP", 4), ("notch", 4), ("limit", 4), ("delay", 1)])
 def test_the_load_is_named(loop: str, every: int) -> None:
     rec, cascade = case(loop, every)
@@ -122,6 +123,7 @@ def test_the_load_is_named(loop: str, every: int) -> None:
     assert dia.mechanics["inertia"].value == pytest.approx(1e-3, rel=0.01)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("loop", "form"), [("IP", ["command_weight"]), ("limit", ["torque_saturation", "anti_windup"]), ("notch", ["torque_filter"])]
 )
@@ -158,6 +160,7 @@ def test_under_a_bare_pi_the_loop_says_whether_a_model_with_the_load_leaves_litt
     assert space.objective.costs(hypothesis, there.x[None, :], WHITE)[0] > limit, "driven by the torque it leaves much"
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("end", ["", AT_LOAD])
 def test_where_on_the_shaft_a_load_acts_that_was_there_before_is_not_said(end: str) -> None:
     """It twists the shaft all the time, and turns the motor the same from either end."""

@@ -193,6 +193,7 @@ def test_a_torque_that_needs_a_negative_integral_gain_is_refused(period: float |
         ga.identify(rec, given)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("known", [True, False])
 def test_a_pi_alone_in_a_cascade_at_the_rate_of_the_log_is_that_pi(known: bool) -> None:
     """Its form is looked for in the same way."""

@@ -46,6 +46,7 @@ def log() -> ga.Record:
     return ga.Record(dt, position_command=path, position=angle, velocity=done.velocity + noise, torque=done.torque)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("case", WRONG)
 def test_the_wrong_number_is_named_and_the_right_one_used(case: str) -> None:
     given, words = WRONG[case]
@@ -64,6 +65,7 @@ def test_the_wrong_number_is_named_and_the_right_one_used(case: str) -> None:
     assert dia.verdict == "explained" and dia.after.rmse < 1.1 * dia.after.noise_floor
 
 
+@pytest.mark.long
 def test_a_loop_that_is_not_the_drives_is_not_simulated() -> None:
     """Two numbers are wrong and no single one helps: the torque drives the models."""
     dia = ga.diagnose(log(), TWO_WRONG)
@@ -132,6 +134,7 @@ def test_a_current_loop_beside_a_coarse_encoder_does_not_hide_the_sample_time() 
     assert shown is not None and shown.controller == ga.Cascade(pi, period)
 
 
+@pytest.mark.long
 def test_behind_a_limit_a_forgotten_sample_time_makes_no_second_mass() -> None:
     dia = ga.diagnose(at_limit(4), ga.PI(0.15, 8.0))
     assert any("0.25 ms is taken for its sample time" in note for note in dia.notes), dia.summary()

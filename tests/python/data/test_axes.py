@@ -116,6 +116,7 @@ def test_a_drive_file_of_several_axes(records: dict[str, ga.Record]) -> None:
     assert set(unfilled_of("marks.toml", "x")) == {("controller", "kp"), ("units", "torque")}
 
 
+@pytest.mark.long
 def test_diagnose_gives_a_row_for_each_axis(records: dict[str, ga.Record], capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["diagnose", "machine.csv", "--drive", "drive.toml", "--out", "run.json"]) == 0
     out = capsys.readouterr().out

@@ -222,6 +222,7 @@ def test_formats_of_other_libraries(
         read(without_name, columns=columns)
 
 
+@pytest.mark.long
 @pytest.mark.filterwarnings("ignore")
 @pytest.mark.parametrize(("file", "make", "columns"), FORMATS, ids=[f"{row[0]}" for row in FORMATS])
 def test_damaged_files_of_other_libraries_never_end_in_a_foreign_error(

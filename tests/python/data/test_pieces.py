@@ -109,6 +109,7 @@ def test_the_advice_on_uneven_times_leads_to_a_record(
     assert [rec.dt for rec in found] == pytest.approx([0.004, 0.004], rel=0.01)
 
 
+@pytest.mark.long
 def test_from_to_and_pieces_of_the_command_line(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

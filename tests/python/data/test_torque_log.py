@@ -234,6 +234,7 @@ def test_under_a_controller_at_the_rate_of_the_log_a_mean_is_a_sample() -> None:
     assert means.model == samples.model and any("mean is taken for a sample" in w for w in means.warnings)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("every", [4, 8])
 @pytest.mark.parametrize(
     ("true", "given", "named"),
@@ -254,6 +255,7 @@ def test_a_log_of_means_is_diagnosed(every: int, true: ga.PI, given: ga.PI, name
     assert isinstance(pi, ga.PI) and pi.kp == pytest.approx(0.08, rel=2e-3) and pi.ki == pytest.approx(4.0, rel=5e-3)
 
 
+@pytest.mark.long
 def test_friction_and_a_torque_filter_are_named_of_means() -> None:
     true = ga.Cascade(PI, period=PERIOD, torque_filters=(ga.LowPass(0.5e-3),))
     rec, _ = logged(true, 8, {"coulomb_friction": {"torque": 0.05}})

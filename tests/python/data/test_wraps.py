@@ -109,6 +109,7 @@ def test_a_record_refuses_an_overflown_channel(key: str) -> None:
     ga.Record(1e-3, **(channels | {key: repaired}))
 
 
+@pytest.mark.long
 def test_read_continues_a_position_and_results_say_so(tmp_path: Path) -> None:
     rec = motion()
     assert rec.position is not None

@@ -36,6 +36,7 @@ def sizes(dia: ga.Diagnosis) -> dict[str, float]:
     return {f.effect: next(iter(f.parameters.values())).value for f in dia.findings}
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("travel", "frequency"), [(1.15, 1.3), (9.0, 0.7)], ids=["sixth of a turn", "through the top"])
 def test_gravity_is_named(travel: float, frequency: float) -> None:
     gravity = {"unbalance": {"amplitude": 0.15, "phase": -0.5}}
@@ -46,6 +47,7 @@ def test_gravity_is_named(travel: float, frequency: float) -> None:
     assert "gravity acts" in dia.force_reason and not any("disagree" in note for note in dia.notes)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("rest", [0.0, 0.1], ids=["at rest", "under tension"])
 def test_a_spring_to_the_ground_is_part_of_the_mechanism(rest: float) -> None:
     plant = replace(PLANT, ground=0.8, rest=rest)

@@ -79,6 +79,7 @@ def hold(shown: Shown | None, named: dict[str, dict[str, float]]) -> None:
             assert abs(value - true) < max(0.01 * abs(true), 4.0 * std), (name, key, value, std)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("digits", [0, 4])
 @pytest.mark.parametrize("name", CASES)
 def test_each_form_is_named_with_its_numbers(name: str, digits: int) -> None:
@@ -88,6 +89,7 @@ def test_each_form_is_named_with_its_numbers(name: str, digits: int) -> None:
     assert shown is not None and (digits or named == {"integration_rule": {}} or shown.rms < 1e-9 * shown.before)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("reads", ["counts", "more"])
 @pytest.mark.parametrize("name", ["notch", "velocity filter"])
 def test_a_lattice_of_speeds_is_the_encoders_or_the_logs(name: str, reads: str) -> None:
@@ -125,6 +127,7 @@ def test_several_records_are_one_regression() -> None:
     hold(shown_by(log(0, weight=0.0), log(1, weight=0.0)), CASES["IP"][1])
 
 
+@pytest.mark.long
 def test_a_torque_that_no_form_makes_is_none() -> None:
     rec = log()
     assert rec.torque is not None
@@ -133,6 +136,7 @@ def test_a_torque_that_no_form_makes_is_none() -> None:
     assert shown_by(rec.with_channels(torque=rec.torque * (1.0 + 0.2 * np.sign(rec.torque)))) is None
 
 
+@pytest.mark.long
 def test_a_diagnosis_names_the_controller_and_no_mechanics() -> None:
     r = command()
     noise = 0.02 * np.random.default_rng(3).standard_normal(len(r))
@@ -178,6 +182,7 @@ def test_what_the_integrator_does_at_a_limit_is_told_by_the_whole_run(windup: st
     assert free.limit is None and free.controller == ga.Cascade(GIVEN, T)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("windup", ["none", "hold"])
 def test_an_anti_windup_that_was_not_given_is_found_at_a_given_limit(windup: str) -> None:
     """At the sample time that was given, and at one that nobody gave; a given limit is no finding."""
@@ -191,6 +196,7 @@ def test_an_anti_windup_that_was_not_given_is_found_at_a_given_limit(windup: str
         assert all("anti-windup 'hold'" in str(f.evidence) and f.delta_bic > 100.0 for f in loop.findings)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("windup", "said"), [("none", "without its anti-windup"), ("hold", "an integrator that is held")])
 @pytest.mark.parametrize("timed", [True, False])
 def test_another_anti_windup_than_the_given_one_is_found_at_a_given_limit(windup: str, said: str, timed: bool) -> None:
@@ -217,6 +223,7 @@ def test_a_tracking_time_that_was_not_given_is_found(every: int, exact: float) -
     assert abs(pi.tracking_time - time) < max(3.0 * std, 1e-6 * time) and std < exact * time
 
 
+@pytest.mark.long
 def test_a_slower_log_whose_torque_no_form_makes_names_none() -> None:
     rec = slower()
     assert rec.torque is not None
@@ -256,6 +263,7 @@ def test_a_rule_of_integration_is_found_before_gains_that_differ_by_little() -> 
     assert found.cause == "integration_rule"
 
 
+@pytest.mark.long
 def test_a_controller_that_is_not_the_drives_is_a_rival_of_mechanics() -> None:
     rec = slower(weight=0.5, torque_filters=[low(1e-3), dip()], command_filters=[low(3e-3)], torque_limit=0.4, windup="hold")
     assert not_followed([rec], loop_of([rec], ga.Cascade(GIVEN, T)).controller)
@@ -265,6 +273,7 @@ def test_a_controller_that_is_not_the_drives_is_a_rival_of_mechanics() -> None:
     assert not {"other_gains", "torque_filter"} & {*alternatives_of("load_torque", [], [], False, None, False)}
 
 
+@pytest.mark.long
 def test_a_wrong_filter_that_was_given_is_not_taken_for_mechanics() -> None:
     rec = slower(4, torque_filters=[low(1e-3)])
     for tau, named in ((1e-3, []), (2e-4, ["torque_filter"])):
@@ -289,6 +298,7 @@ def test_what_was_given_and_is_not_there_is_left_out() -> None:
     assert not not_followed([rec], form.controller)
 
 
+@pytest.mark.long
 def test_a_loop_in_doubt_explains_nothing() -> None:
     """Four things at once are no form that a slow log shows: what a wrong loop leaves looks like mechanics."""
     rec = slower(weight=0.5, torque_filters=[low(1e-3), dip()], command_filters=[low(3e-3)], torque_limit=0.4, windup="hold")
@@ -326,6 +336,7 @@ def test_a_form_that_was_found_is_not_looked_for_again() -> None:
     assert found.findings == asked.findings and found.controller == asked.controller
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("every", [2, 4])
 def test_a_rule_at_a_faster_clock_is_taken_before_gains_that_differ_by_little(every: int) -> None:
     """On the lines a rectangular integral of r samples to a line is about one of kp + ki dt/(2 r)."""
@@ -346,6 +357,7 @@ def test_a_rule_at_a_faster_clock_is_taken_before_gains_that_differ_by_little(ev
     assert wrong.controller == ga.PI(0.99 * KP, KI) and wrong.period_notes == ()
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("every", [2, 4])
 def test_a_form_shows_the_sample_time_that_nobody_gave(every: int) -> None:
     with threadpool_limits(1, user_api="blas"):

@@ -244,6 +244,7 @@ def test_a_hum_gets_its_frequency_and_size_and_a_lattice_its_noise() -> None:
     assert found.before.noise_floor >= 0.1 / math.sqrt(12.0)
 
 
+@pytest.mark.long
 def test_a_hum_in_two_records_is_one_frequency_with_a_phase_of_each() -> None:
     """No effect has a phase of each record: what it is like is said of the error that is left."""
     whole = limited_drive(math.inf, hum=0.03)
@@ -252,6 +253,7 @@ def test_a_hum_in_two_records_is_one_frequency_with_a_phase_of_each() -> None:
     assert found.line == (pytest.approx(37.0, abs=0.3), pytest.approx(0.03, rel=0.1))
 
 
+@pytest.mark.long
 def test_a_diagnosis_replays_a_record_once_with_the_same_controller(monkeypatch: pytest.MonkeyPatch) -> None:
     """Only another controller, or a record with other samples, asks for another replay."""
     done = []

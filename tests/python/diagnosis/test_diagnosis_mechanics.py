@@ -128,6 +128,7 @@ def test_a_torque_of_the_wrong_sign_is_still_refused() -> None:
         derive_space([ga.Record(rec.dt, velocity=rec.velocity, torque=-rec.torque)], None)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("seed", [1, 3, 8, 10])
 def test_a_pendulum_in_open_loop_has_no_wrong_sign(seed: int) -> None:
     """It swings so far that it is on no spring, and its velocity often falls when the torque rises."""
@@ -203,6 +204,7 @@ def test_poles_below_the_zeros_are_no_two_masses() -> None:
     assert found["viscous_friction"][1] == pytest.approx(1.0 * (60.0**2 + 4.0) / (2000.0 * (90.0**2 + 4.0)))
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("side", ["motor", "load"])
 def test_dry_friction_is_found_at_its_end_of_the_shaft(side: str) -> None:
     """Against the independent integrator, which shares no code with the library."""
@@ -225,6 +227,7 @@ def test_dry_friction_is_found_at_its_end_of_the_shaft(side: str) -> None:
     assert ga.Diagnosis.from_dict(json.loads(json.dumps(dia.to_dict()))).findings == dia.findings
 
 
+@pytest.mark.long
 def test_an_offset_at_the_load_is_told_from_viscous_friction_that_depends_on_the_direction() -> None:
     """Two levels that are even, and two viscous parts: no constant load is as good, so that friction is named alone."""
     rng = np.random.default_rng(3)

@@ -147,6 +147,7 @@ def test_a_record_for_validation_at_rest_judges_nothing() -> None:
     assert held_parts([rec], [slow], None) == ([(slow, 0)], "validation records", None, ())
 
 
+@pytest.mark.long
 def test_a_fall_of_the_error_at_standstill_is_none_and_is_said() -> None:
     """Friction holds what the linear model lets drift: at rest the error falls by 99 %, and shows nothing."""
     rec, still = friction_record(3000, 0), friction_record(0, 1500)

@@ -60,6 +60,7 @@ def test_both_methods_are_compared_in_one_unit(diagnosis: ga.Diagnosis) -> None:
     assert shown["inertia"] == ("kg", "kg") and shown["dry friction"] == ("N", "N")
 
 
+@pytest.mark.long
 def test_a_force_that_follows_the_place_gets_no_name_of_a_turn() -> None:
     """The numbers are those of gravity on a rotary axis, which that of the regression finds."""
     rec = record(60.0)[:1000]
@@ -102,6 +103,7 @@ def screw(pitch: float) -> ga.Record:
     return ga.Record(1e-3, command=command, velocity=run.velocity + noise, torque=run.torque, position=run.position)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("given", [0.024, 0.048])
 def test_cogging_of_a_linear_axis_is_found_by_its_pitch(given: float) -> None:
     """By the pitch itself, and by one of which it is the second order."""
@@ -114,6 +116,7 @@ def test_cogging_of_a_linear_axis_is_found_by_its_pitch(given: float) -> None:
     assert "every 24 mm" in dia.summary() and "torque" not in dia.summary().lower()
 
 
+@pytest.mark.long
 def test_a_pitch_that_nobody_gave_is_seen() -> None:
     """The same screw, and one of 10.3 mm; its length is then a number of the fit."""
     for pitch in (0.024, 0.0103):

@@ -55,6 +55,7 @@ def test_the_law_shows_which_channel_was_moved(plant: Plant, noise: str) -> None
     assert looked_at(found.records[0], plant)[0] == {}
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("channel", ["velocity", "command"])
 def test_where_a_shift_makes_the_torque_follow_no_other_sample_time_is_advised(channel: str) -> None:
     rec = rig(RIGID, STEPS, FRICTION, "white").shifted(**{channel: 1})
@@ -65,6 +66,7 @@ def test_where_a_shift_makes_the_torque_follow_no_other_sample_time_is_advised(c
     assert not any("period" in note for note in (*found.notes, *found.moved.notes))
 
 
+@pytest.mark.long
 def test_what_is_no_shift_is_not_moved() -> None:
     """Delay, lag, filter, wrong gains, another rule of integration and limits are explained otherwise, or are the drive's."""
     rectangular = ga.PI(RIGID.kp + 0.5 * RIGID.ki * RIGID.dt, RIGID.ki)
@@ -264,6 +266,7 @@ def test_a_lag_that_the_model_accounts_for_is_no_reason_to_shift_the_log() -> No
     assert "the torque lag and the age of the velocity, 1 sample together" in found.noted(half).notes[0]
 
 
+@pytest.mark.long
 def test_a_delay_of_whole_samples_in_open_loop_may_be_the_log_s() -> None:
     """A delay, a filter of the sensor or a log that wrote the torque early: without a controller nothing tells them apart."""
     rec = rig(RIGID, STEPS, {"transport_delay": {"delay": 1e-3}}).with_channels(command=None)
@@ -289,6 +292,7 @@ def test_a_torque_that_was_logged_late_in_open_loop_is_moved_and_the_inertia_is_
     assert dia.mechanics["inertia"].value == pytest.approx(RIGID.J, rel=0.01)
 
 
+@pytest.mark.long
 def test_the_diagnosis_names_the_cause_behind_a_shift_and_speaks_of_the_records_that_it_was_given(tmp_path: Path) -> None:
     rec = rig(RIGID, STEPS, FRICTION, position_logged=True).shifted(torque=1)
     dia = ga.diagnose(rec, RIGID.controller)
@@ -307,6 +311,7 @@ def test_the_diagnosis_names_the_cause_behind_a_shift_and_speaks_of_the_records_
     assert "The log wrote the torque 1 sample late" in (tmp_path / "page.html").read_text(encoding="utf-8")
 
 
+@pytest.mark.long
 def test_a_drive_that_computes_for_a_sample_has_a_transport_delay() -> None:
     """Its log is the same as one of a shift, but the motion comes a sample later, and the delay is found where it acts."""
     rec = rig(RIGID, STEPS, DELAY, "none").shifted(torque=1)

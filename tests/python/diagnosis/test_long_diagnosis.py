@@ -101,6 +101,7 @@ def test_a_speed_without_its_sign_is_recognised_and_a_speed_in_one_direction_is_
     assert "speed without its sign" in " ".join(dia.summary().split())
 
 
+@pytest.mark.long
 def test_a_long_record_names_its_cause_beside_a_small_remainder() -> None:
     """Friction that depends on the direction, and a little of it missing near rest, which is not in the library."""
     rec = axis(10_000, low=0.15)
@@ -113,6 +114,7 @@ def test_a_long_record_names_its_cause_beside_a_small_remainder() -> None:
     assert dia.gain_interval[0] > 0.5 and dia.samples == 10_000
 
 
+@pytest.mark.long
 def test_output_errors_are_weighed_anew_on_all_samples(monkeypatch: pytest.MonkeyPatch) -> None:
     """The prefilter of a coarse grid ends at a tenth of its sample rate: what it removes is what that grid could not show."""
     rec = axis(8000, noise=1e-4)
@@ -139,6 +141,7 @@ def test_output_errors_are_weighed_anew_on_all_samples(monkeypatch: pytest.Monke
     assert 10.0 < family.samples < 0.2 * len(rec)
 
 
+@pytest.mark.long
 def test_an_effect_that_makes_held_out_data_worse_is_refused() -> None:
     """The load is in the training record alone, as if it had been taken off before the other one was made."""
     t = np.arange(3000) * DT
@@ -156,6 +159,7 @@ def test_an_effect_that_makes_held_out_data_worse_is_refused() -> None:
     assert any("makes the held-out data worse" in note for note in refused.notes)
 
 
+@pytest.mark.long
 def test_a_lag_within_a_step_of_the_coarse_grid_is_no_second_mass() -> None:
     """A clean axis of one mass and a current loop: the grid of 0.5 ms shows its lag of 0.2 ms as a shaft of 370 Hz."""
     skip_without_library()
@@ -175,6 +179,7 @@ def test_a_lag_within_a_step_of_the_coarse_grid_is_no_second_mass() -> None:
     assert dia.mechanics["inertia"].value == pytest.approx(9e-4, rel=1e-6) and "load_inertia" not in dia.mechanics
 
 
+@pytest.mark.long
 def test_a_gap_in_a_long_record_is_found_in_the_loop_under_any_controller() -> None:
     """A rattling shaft of 160 Hz behind a current loop, 20 bits differenced: on a coarse grid the errors of the model grow.
 

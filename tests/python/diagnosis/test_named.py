@@ -15,6 +15,7 @@ STIFF = ga.PI(kp=0.03, ki=0.45)
 DT = 1e-3
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("noise", [0.0, 1e-6, 1e-2])
 def test_two_causes_are_found_however_little_noise_there_is(noise: float) -> None:
     """Without a logged torque output errors are those of the closed loop, which shows friction and gravity little."""
@@ -29,6 +30,7 @@ def test_two_causes_are_found_however_little_noise_there_is(noise: float) -> Non
     assert sizes["coulomb_friction"] == pytest.approx(0.05, rel=0.05) and sizes["unbalance"] == pytest.approx(0.03, rel=0.05)
 
 
+@pytest.mark.long
 def test_what_whitened_errors_find_is_offered_to_output_errors_before_these_decide() -> None:
     """A drag is not tried beside a friction, of whose family it is, and leaves far more than noise, so that output errors decide.
 
@@ -46,6 +48,7 @@ def test_what_whitened_errors_find_is_offered_to_output_errors_before_these_deci
         assert abs(unbalance[name].value - value) < 3.0 * unbalance[name].std
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("profile", ["ramps", "sines", "one direction"])
 def test_dry_friction_beside_a_drag(profile: str) -> None:
     """Alone each of them pays little, as both together are nearly viscous friction: the regression tries them together.
@@ -60,6 +63,7 @@ def test_dry_friction_beside_a_drag(profile: str) -> None:
     assert found["quadratic_drag"]["coefficient"].value == pytest.approx(4e-4, rel=0.1)
 
 
+@pytest.mark.long
 def test_friction_that_falls_up_to_a_fifth_of_the_speed() -> None:
     """Beside dry friction of one size it is a damping below 0, from which no fit came to it: a drag was named.
 
@@ -74,6 +78,7 @@ def test_friction_that_falls_up_to_a_fifth_of_the_speed() -> None:
         assert dia.causes[0].parameters[name].value == pytest.approx(value, rel=0.15)
 
 
+@pytest.mark.long
 def test_an_unbalance_on_an_elastic_shaft_behind_the_noise_of_a_measured_torque() -> None:
     """Linear models leave slow errors, of nine independent samples, beside which nothing was worth its cost.
 
@@ -89,6 +94,7 @@ def test_an_unbalance_on_an_elastic_shaft_behind_the_noise_of_a_measured_torque(
     assert dia.mechanics["inertia"].value == pytest.approx(truth.plant.J + truth.plant.JL, rel=0.02)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("seed", [0, 3])
 def test_a_lag_that_is_not_in_the_library_is_no_second_mass(seed: int) -> None:
     """A first-order filter of the velocity that works at the controller's samples, 2 per time constant.
@@ -101,6 +107,7 @@ def test_a_lag_that_is_not_in_the_library_is_no_second_mass(seed: int) -> None:
     assert dia.mechanics["inertia"].value == pytest.approx(1e-3, rel=0.01) and "load_inertia" not in dia.mechanics
 
 
+@pytest.mark.long
 def test_dry_friction_that_the_regression_has_not_is_found_where_the_velocity_is_late() -> None:
     """Steps: behind the regression's filter the friction is less than its deviation. Nothing was named."""
     rec = filtered_at_its_samples(7, lag=0.0)
@@ -173,6 +180,7 @@ CASES = {
 }
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("effect", CASES)
 def test_it_is_named_with_its_numbers(effect: str) -> None:
     found = ga.diagnose(hidden({effect: CASES[effect]}), STIFF)
@@ -193,5 +201,6 @@ def test_a_changing_inertia_is_of_the_mechanism_and_has_no_side() -> None:
         two.with_effect("position_inertia", **CASES["position_inertia"]).with_effect("extra_resonance", **resonance)
 
 
+@pytest.mark.long
 def test_a_clean_drive_has_none_of_them() -> None:
     assert ga.diagnose(hidden({}), STIFF).causes == ()

@@ -37,6 +37,7 @@ def ambiguous_step(effect: str) -> tuple[ga.Record, ga.PI, Truth, ga.Diagnosis]:
     pytest.fail(f"no step record of {AMBIGUOUS_SEEDS} leaves a choice about {effect}")
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("effect", ["coulomb_friction", "stribeck_friction"])
 def test_the_proposed_experiment_names_what_a_step_could_not(effect: str) -> None:
     rec, controller, truth, dia = ambiguous_step(effect)
@@ -52,6 +53,7 @@ def test_the_proposed_experiment_names_what_a_step_could_not(effect: str) -> Non
     assert after.next_experiment is None
 
 
+@pytest.mark.long
 def test_twins_get_the_missing_signal_instead_of_a_command() -> None:
     rec, _, controller, _ = random_case(0, ("torque_lag",))
     dia = ga.diagnose(rec, controller)

@@ -60,6 +60,7 @@ def held(command: NDArray[np.float64], friction: float, seed: int) -> ga.Record:
     return ga.Record(DT, velocity=done.velocity + noise, torque=done.torque)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("friction", "seeds"), [(0.02, range(4)), (0.002, range(8))])
 def test_the_viscous_friction_of_a_step_contains_the_dry_one_and_its_deviation_says_so(
     friction: float, seeds: range, monkeypatch: pytest.MonkeyPatch

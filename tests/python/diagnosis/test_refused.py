@@ -35,6 +35,7 @@ def record(seed: int) -> ga.Record:
     return ga.Record(1e-3, command=r, velocity=run.velocity + noise, torque=run.torque)
 
 
+@pytest.mark.long
 def test_what_is_said_is_said_of_the_model_without_the_refused_effect(monkeypatch: pytest.MonkeyPatch) -> None:
     measured, calls = module.measured_gains, []
 
@@ -55,6 +56,7 @@ def test_what_is_said_is_said_of_the_model_without_the_refused_effect(monkeypatc
     assert all(f.delta_bic != pytest.approx(both["coulomb_friction"], rel=1e-3) for f in without.causes)
 
 
+@pytest.mark.long
 def test_a_model_with_a_negative_damping_is_not_adequate(monkeypatch: pytest.MonkeyPatch) -> None:
     rec, controller = record(2), ga.PI(kp=0.02, ki=0.5)
     whole = ga.diagnose(rec, controller)
@@ -72,6 +74,7 @@ def test_a_model_with_a_negative_damping_is_not_adequate(monkeypatch: pytest.Mon
     assert ga.diagnose(rec, controller).verdict == "explained"
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("pair", ["resonance_damping", "antiresonance_damping"])
 def test_a_pair_that_drives_itself_is_not_adequate_either(monkeypatch: pytest.MonkeyPatch, pair: str) -> None:
     """A forgotten filter between the lines of a log was two masses with a damping ratio of -0.33, and that adequate."""
@@ -83,6 +86,7 @@ def test_a_pair_that_drives_itself_is_not_adequate_either(monkeypatch: pytest.Mo
         assert (dia.verdict, dia.driver) == (verdict, driver)
 
 
+@pytest.mark.long
 def test_a_negative_damping_is_said_beside_what_is_left_too(monkeypatch: pytest.MonkeyPatch) -> None:
     rec, controller, true, judged = record(2), ga.PI(kp=0.02, ki=0.5), module.mechanics_of, module.Work.judged
     driven = ga.Estimate(-0.01, 0.003, "N m s/rad")
@@ -127,6 +131,7 @@ def test_a_wrong_expectation_is_refused(wrong: Any) -> None:
         ga.diagnose(record(2), ga.PI(kp=0.02, ki=0.5), expected=wrong)
 
 
+@pytest.mark.long
 def test_that_none_is_named_is_said_only_where_none_is(monkeypatch: pytest.MonkeyPatch) -> None:
     true = module.mechanics_of
 
@@ -168,6 +173,7 @@ def swinging(seed: int) -> ga.Record:
     return ga.Record(dt, velocity=log[0], torque=log[1], position=log[2])
 
 
+@pytest.mark.long
 def test_a_viscous_friction_that_drives_the_axis_is_no_mechanism() -> None:
     """By whitened errors a drag of the square root of the speed, and -0.014 N m s/rad beside it: worse than without an effect."""
     dia = ga.diagnose(swinging(0))

@@ -78,6 +78,7 @@ def test_a_filtered_velocity_is_late_behind_the_position_and_a_plain_one_is_not(
     assert velocity_lag(other) is None, "a velocity that is not that of the position"
 
 
+@pytest.mark.long
 def test_friction_beside_gravity_is_seen_to_grow_with_the_load() -> None:
     dia = ga.diagnose(joint(LOADED))
     assert {f.effect for f in dia.causes} == {"unbalance", "load_dependent_friction"}
@@ -89,12 +90,14 @@ def test_friction_beside_gravity_is_seen_to_grow_with_the_load() -> None:
     assert not any("disagree" in note for note in dia.notes), "a regression without it has no one number to compare"
 
 
+@pytest.mark.long
 def test_friction_of_one_size_beside_gravity_is_not_seen_to_grow_with_the_load() -> None:
     dia = ga.diagnose(joint({**GRAVITY, "coulomb_friction": {"torque": 10.5}}))
     assert {f.effect for f in dia.causes} == {"unbalance", "coulomb_friction"}
     assert not any(f.alternatives for f in dia.causes) and dia.verdict == "explained"
 
 
+@pytest.mark.long
 def test_a_steep_drag_alone_is_no_dry_friction() -> None:
     (cause,) = ga.diagnose(joint(ROOT)).causes
     assert cause.effect == "square_root_drag" and not cause.alternatives

@@ -39,6 +39,7 @@ def content(dia: ga.Diagnosis) -> dict[str, Any]:
     return found | {"identification": found["identification"] | {"seconds": 0.0}}
 
 
+@pytest.mark.long
 def test_two_records_in_either_order_held_out_ones_too_and_a_bootstrap() -> None:
     records, later = [recorded(0), recorded(1, LEVELS[::-1])], [recorded(2), recorded(3)]
     one = ga.diagnose(records, CONTROLLER, validation=later, bootstrap=1, seed=5)
@@ -49,6 +50,7 @@ def test_two_records_in_either_order_held_out_ones_too_and_a_bootstrap() -> None
     assert "(bootstrap): at most 0.5." in " ".join(one.summary().split())
 
 
+@pytest.mark.long
 def test_three_records_of_another_controller_in_any_order() -> None:
     """The gains that the logged torques show are a mean over the records, and the sentence that says so quotes one of them."""
     a, b, c = (recorded(seed, LEVELS[seed : seed + 3], torque=True) for seed in range(3))
@@ -60,6 +62,7 @@ def test_three_records_of_another_controller_in_any_order() -> None:
         assert content(other) == content(first)
 
 
+@pytest.mark.long
 def test_any_number_of_workers() -> None:
     records = [recorded(0, LEVELS[:3]), recorded(1, LEVELS[2:])]
     identified = [ga.identify(records, CONTROLLER, workers=n) for n in (1, 2, 4)]
@@ -80,6 +83,7 @@ print(json.dumps(said))
 """
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     "setting",
     [
@@ -123,6 +127,7 @@ def varied() -> tuple[ga.Diagnosis, Any]:
     return dia, dia.stability()
 
 
+@pytest.mark.long
 def test_a_cause_of_the_drive_is_named_in_its_variations(varied: tuple[ga.Diagnosis, Any]) -> None:
     """Dry friction is in every part of the record; with a torque logged it is looked for in half as many lines, too."""
     dia, found = varied
@@ -137,6 +142,7 @@ def test_a_cause_of_the_drive_is_named_in_its_variations(varied: tuple[ga.Diagno
         found.named("backlash")
 
 
+@pytest.mark.long
 def test_stability_says_the_same_again_and_of_a_loaded_diagnosis(varied: tuple[ga.Diagnosis, Any]) -> None:
     dia, found = varied
     loaded = ga.Diagnosis.from_dict(dia.to_dict())
@@ -171,6 +177,7 @@ def test_a_cause_of_one_part_alone_is_a_hint() -> None:
     assert unseen.sentences[1] == "backlash: named in 0 of 0 variations that could show it."
 
 
+@pytest.mark.long
 def test_what_the_integrator_held_when_a_record_began_is_no_load() -> None:
     """Cut out of a run, without a torque: the integral at its start acts like a constant load, which the drive has not."""
     whole = recorded(4, LEVELS * 2)

@@ -112,6 +112,7 @@ def test_noise_on_a_measured_torque_does_not_move_the_inertia(noise: float) -> N
     assert np.mean([e.value for e in inertias]) == pytest.approx(PLANT.J, rel=0.01)
 
 
+@pytest.mark.long
 def test_deviations_are_those_of_the_scatter() -> None:
     found = [ga.inverse_dynamics(record(FRICTION, seed, 0.1), terms=("inertia", "viscous", "coulomb")) for seed in range(30)]
     for name in ("inertia", "viscous", "coulomb"):

@@ -98,6 +98,7 @@ def test_a_fit_from_its_optimum_makes_one_jacobian_and_one_grid_of_steps() -> No
     assert objective.counter.simulations - before == 1 + len(x) + len(ls.DAMPINGS)
 
 
+@pytest.mark.long
 def test_a_model_of_output_errors_that_leaves_noise_is_where_the_search_of_whitened_errors_begins(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:

@@ -74,6 +74,7 @@ def test_a_differenced_angle_in_a_log_of_few_decimals_is_no_finding() -> None:
     assert dia.causes == (), dia.summary()
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("lines", [2**20, 1031703])
 def test_half_a_period_of_a_controller_faster_than_the_log_is_no_delay(lines: int) -> None:
     """Four things differ from the given controller, so that the logged torque drives the model; it is straight between lines.
@@ -108,6 +109,7 @@ def test_the_mean_over_a_sample_is_exact_behind_a_current_loop() -> None:
     assert np.abs(shown - exact).max() < 0.02 * np.abs(ends - exact).max()
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("lag", [0.0, 0.4e-3])
 def test_a_differenced_angle_is_no_finding(lag: float) -> None:
     effects = {"torque_lag": {"time_constant": lag}} if lag else {}
@@ -121,6 +123,7 @@ def test_a_differenced_angle_is_no_finding(lag: float) -> None:
     assert found.parameters["time_constant"].value == pytest.approx(lag, rel=0.01)
 
 
+@pytest.mark.long
 def test_a_differenced_angle_without_a_logged_torque_is_no_finding() -> None:
     with_effect, bare = (record(1, effects).with_channels(torque=None) for effects in ({"torque_saturation": {"limit": 0.5}}, {}))
     dia = ga.diagnose(bare, DRIVE.controller)
@@ -129,6 +132,7 @@ def test_a_differenced_angle_without_a_logged_torque_is_no_finding() -> None:
     assert any("torque_saturation" in (f.effect, *f.alternatives) for f in dia.causes), dia.summary()
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("effect", "logged"), [("", True), ("stribeck_friction", True), ("torque_lag", True), ("cogging", True), ("cogging", False)]
 )
@@ -146,6 +150,7 @@ SHAFT = Plant(J=2e-4, D=7e-4, JL=2.7e-4, DL=7e-4, KG=381.0, DG=0.0084, kp=0.06, 
 LAG = {"torque_lag": {"time_constant": 0.4e-3}}
 
 
+@pytest.mark.long
 def test_the_age_is_told_behind_a_lag_beside_a_resonance() -> None:
     """A mechanism that was fitted without the lag has its resonance elsewhere: neither age fits from there."""
     dia = ga.diagnose(record(1, LAG, drive=SHAFT), SHAFT.controller, validation=record(2, LAG, drive=SHAFT))
@@ -194,6 +199,7 @@ def test_a_peak_that_the_found_model_follows_is_no_outlier() -> None:
     assert unexplained(w, 0.1 * w, weight) == 0
 
 
+@pytest.mark.long
 def test_a_linear_scale_has_decimal_lines_and_a_load_beside_it_is_no_friction() -> None:
     """A vertical axis whose brake opens on a held load: 25 N of friction, 250 N of load, a scale of 0.1 micrometres."""
     skip_without_library()

@@ -52,6 +52,7 @@ def test_a_torque_ahead_is_on_its_way_to_that_of_the_next_line() -> None:
     assert late(u, 0.0, 0.0) is u
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("differenced", [False, True])
 def test_a_forgotten_period_is_no_second_mass(differenced: bool) -> None:
     dia = ga.diagnose(record(ONE, differenced), GIVEN)
@@ -61,6 +62,7 @@ def test_a_forgotten_period_is_no_second_mass(differenced: bool) -> None:
     assert dia.causes[0].parameters["torque"].value == pytest.approx(0.15, rel=0.01)
 
 
+@pytest.mark.long
 def test_a_torque_that_is_held_is_not_moved() -> None:
     at_its_rate = replace(ONE, cascade=replace(NOTCHED, period=DT))
     rec = record(at_its_rate, differenced=False)
@@ -92,6 +94,7 @@ def test_a_jump_at_the_first_line_moves_no_torque() -> None:
     assert seen is not None and abs(seen.lag) < 0.1, seen
 
 
+@pytest.mark.long
 def test_of_an_axis_under_gravity_nothing_is_named_that_the_torque_between_the_lines_makes() -> None:
     """A 100 Hz log of a 1 kHz controller, which nobody gave: 0.45 lines. Held, it had a second mass, and gravity at both ends."""
     skip_without_library()

@@ -64,6 +64,7 @@ def test_which_torque_acted_before(velocity: np.ndarray, stored: float, before: 
     assert torque_before(ga.Record(DT, velocity=velocity, command=torque)) == 0.0
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("given", [True, False])
 def test_a_delay_under_a_standing_load_is_found_as_it_is(given: bool) -> None:
     """With an empty delay at the start it was half as long, a filter of the velocity beside it, and the load off."""

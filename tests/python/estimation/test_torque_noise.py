@@ -32,6 +32,7 @@ def test_torque_noise_of_a_drive_without_effects_is_no_cause() -> None:
     assert any("noise of the measured torque" in note for note in dia.notes)
 
 
+@pytest.mark.long
 def test_friction_beside_torque_noise_is_explained() -> None:
     record, validation, _, truth = random_case(212000000, "coulomb_friction", "multi", "white")
     assert validation is not None
@@ -72,6 +73,7 @@ def test_added_up_is_what_white_torque_noise_makes_of_a_free_run() -> None:
     assert torque_noise_in(model, [quiet]) == 0.0  # a command in steps is no noise
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("seed", range(3))
 def test_a_load_that_comes_on_is_no_torque_noise(seed: int) -> None:
     """A noise model of torques takes it for noise; the free run says that no noise of this torque is so large."""
@@ -97,6 +99,7 @@ def measured(seed: int, share: float, effects: dict[str, dict[str, float]] | Non
     return ga.Record(1e-3, velocity=rec.velocity, torque=rec.torque + noise, torque_is="measured")
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("share", [0.02, 0.05])
 @pytest.mark.parametrize("seed", [0, 2, 7])
 def test_the_noise_of_a_measured_torque_is_no_cause(seed: int, share: float) -> None:

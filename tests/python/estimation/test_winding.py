@@ -109,6 +109,7 @@ def test_the_winding_is_estimated_from_voltage_current_and_velocity(log: dict[st
         offset.error = 0.0  # type: ignore[misc]
 
 
+@pytest.mark.long
 def test_an_inductance_that_the_samples_cannot_show_is_not_said() -> None:
     """Of a time constant below an eighth of a sample, the current at the sample's end keeps less than a thousandth.
 
@@ -125,6 +126,7 @@ def test_an_inductance_that_the_samples_cannot_show_is_not_said() -> None:
             assert found.winding.resistance == pytest.approx(R, rel=0.01)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("every", [2, 4, 8])
 def test_a_voltage_that_goes_on_between_the_lines(every: int) -> None:
     """That of a current controller faster than the log: taken as held, R was 2.7 % too small, by 200 deviations, and L none."""
@@ -233,6 +235,7 @@ def centred(torque: NDArray[np.float64]) -> NDArray[np.float64]:
     return 0.5 * (torque + np.concatenate([torque[:1], torque[:-1]]))
 
 
+@pytest.mark.long
 def test_without_its_inductance_the_winding_is_an_actuator_with_a_lag(here: Path) -> None:
     """A velocity filter alone had the name, as no actuator was looked for in front of a torque that counted as measured."""
     rec = ga.read("motor.csv", {**COLUMNS, "voltage": "U"}, resistance=R, torque_constant=KT)
@@ -268,6 +271,7 @@ def test_the_torque_of_a_sampled_current_between_its_samples(here: Path) -> None
     assert rec.torque[0] == pytest.approx(found.winding.torque_constant * data[0, 2])
 
 
+@pytest.mark.long
 def test_the_current_falls_within_a_sample_while_the_motor_speeds_up() -> None:
     """Lines of 5 ms, a mechanical time constant of 22: taken as the current at the end of each, the inertia was 8 % too small."""
     t = DT * np.arange(20_000)
@@ -286,6 +290,7 @@ def test_the_current_falls_within_a_sample_while_the_motor_speeds_up() -> None:
         ga.Winding(R, KT, L).mean_current(i, 5.0 * DT, w[1:])
 
 
+@pytest.mark.long
 def test_resistance_and_a_small_inductance_are_told_apart_badly_where_the_motor_only_accelerates_itself() -> None:
     """R was 3.4 % too small at 0.03 %: of an L/R of 0.15 samples the voltage L di/dt looked like a smaller R."""
     t = DT * np.arange(20_000)
@@ -297,6 +302,7 @@ def test_resistance_and_a_small_inductance_are_told_apart_badly_where_the_motor_
         assert 0.002 * R < found.std < 0.05 * R and abs(found.value - R) < 4.0 * found.std
 
 
+@pytest.mark.long
 def test_the_diagnosis_finds_the_friction_behind_the_winding(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
     Path("drive.toml").write_text(
         f"resistance = {R}\ntorque_constant = {KT}\ninductance = {L}\n[columns]\ntime = 't'\nvelocity = 'n'\nvoltage = 'U'\n"

@@ -195,6 +195,7 @@ def test_a_killed_worker_costs_nothing(inside: Path) -> None:
     assert content(inside / "worker") == content(inside / "whole")
 
 
+@pytest.mark.long
 def test_ctrl_c_keeps_what_is_done(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     for day in range(150):  # far more than are done when it comes

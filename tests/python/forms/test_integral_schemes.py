@@ -29,6 +29,7 @@ def log(scheme: str) -> ga.Record:
     return scheme_log(axis, np.repeat(command, 4), scheme, 1)
 
 
+@pytest.mark.long
 def test_a_decay_for_each_limited_sample() -> None:
     rec = log("decay")
     shown = scheme_shown([rec], GIVEN)
@@ -71,6 +72,7 @@ def test_nothing_is_found_where_the_controller_is_another_one() -> None:
     assert scheme_shown([rec], GIVEN) is None
 
 
+@pytest.mark.long
 def test_a_diagnosis_names_the_law_and_no_mechanics() -> None:
     dia = ga.diagnose(log("dead band"), GIVEN)
     assert [f.effect for f in dia.causes] == ["error_dead_band"] and dia.verdict == "explained"

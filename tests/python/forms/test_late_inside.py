@@ -64,6 +64,7 @@ def test_it_is_asked_only_in_the_loop_of_a_slow_log_with_a_torque() -> None:
     assert late_inside(*fitted(bare, "quadratic_drag")) == [], "nothing is late"
 
 
+@pytest.mark.long
 def test_a_controller_that_lacks_something_is_an_alternative(monkeypatch: pytest.MonkeyPatch) -> None:
     rec, said = record(), Text("late inside")
     plain = ga.diagnose(rec, WHOLE)

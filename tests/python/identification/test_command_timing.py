@@ -158,6 +158,7 @@ def test_shares_are_means_between_the_lines(every: int) -> None:
     assert np.all((unsure.usual >= 0.0) & (unsure.usual <= 1.0))
 
 
+@pytest.mark.long
 def test_jumps_between_the_lines_are_no_cause() -> None:
     """They were named as friction, a resonance, a delay; J was 2 to 30 % off."""
     for every, seed in ((4, 2), (8, 3)):
@@ -167,6 +168,7 @@ def test_jumps_between_the_lines_are_no_cause() -> None:
         assert dia.mechanics["load_inertia"].value == pytest.approx(4e-4, rel=5e-3)
 
 
+@pytest.mark.long
 def test_friction_is_named_under_jumps_between_the_lines() -> None:
     rec = record(levels(8, 4), 8, LOOP, coulomb_friction={"torque": 0.05})
     dia = ga.diagnose(rec, LOOP)

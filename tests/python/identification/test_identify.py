@@ -64,6 +64,7 @@ def test_mechanics_are_recovered_within_their_standard_deviations() -> None:
         assert idn.mechanics.std[name] < 0.5 * value, name
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("colour", [0.0, 0.9])
 def test_standard_deviations_are_calibrated(colour: float) -> None:
     """z-scores of 40 noise draws, white and coloured: their rms is 1 within what 40 draws tell."""

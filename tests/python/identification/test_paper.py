@@ -176,6 +176,7 @@ def test_the_rig_shares_nothing_with_the_package_s_simulation() -> None:
 # --- the run
 
 
+@pytest.mark.long
 @BOTH
 def test_fitness_structures_and_times(made: tuple[Path, dict[str, Any]], mechanism: Mechanism) -> None:
     part = made[1]["mechanisms"][mechanism.key]

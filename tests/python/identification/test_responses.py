@@ -119,6 +119,7 @@ def test_delay_and_lag_of_the_path_are_told_apart(late: float, lag: float) -> No
     assert again == idn and again.lag == idn.lag
 
 
+@pytest.mark.long
 def test_deviations_of_a_lag_hold_where_the_noise_is_large() -> None:
     """With 20 % of noise the mean error is chance, and the errors are as large as stated."""
     lag, f = 0.4e-3, np.geomspace(5.0, 400.0, 300)
@@ -210,6 +211,7 @@ def test_the_model_has_the_path_and_its_covariance() -> None:
     assert gain == pytest.approx(np.sqrt(covariance[0, 0]), rel=1e-4)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("turn", "remedy"), [(np.negative, "opposite sign"), (np.conj, "conjugate")])
 def test_a_response_of_another_sign_behind_a_path_is_refused(turn: np.ufunc, remedy: str) -> None:
     g = turn(noisy(exact() * np.exp(-2j * np.pi * F * 0.3e-3) / (1.0 + 2j * np.pi * F * 0.2e-3), 0.01, 1))
@@ -217,6 +219,7 @@ def test_a_response_of_another_sign_behind_a_path_is_refused(turn: np.ufunc, rem
         ga.identify(ga.FrequencyResponse(F, g, 0.01 * np.abs(g)))
 
 
+@pytest.mark.long
 def test_gains_are_designed_with_the_path_in_the_loop() -> None:
     """Behind a lag the loop is slower, and the model of the gains has it."""
     lag, loop = 2e-3, ga.PI(kp=0.02, ki=0.4)
@@ -286,6 +289,7 @@ def test_a_response_of_another_axis_beside_a_record_falsifies() -> None:
     assert ga.identify([rec, ga.FrequencyResponse(F, other, 0.01 * np.abs(other), dt=1e-3)], loop).falsified
 
 
+@pytest.mark.long
 def test_responses_at_two_amplitudes_hint_at_what_is_not_linear() -> None:
     peak = np.abs(exact() * F).argmax()
     shifted = exact(F / 1.3) / 1.3  # of a shaft that is stiffer
@@ -299,6 +303,7 @@ def test_responses_at_two_amplitudes_hint_at_what_is_not_linear() -> None:
     assert not [w for w in ga.identify([alike, other]).warnings if w.startswith("Not linear")]
 
 
+@pytest.mark.long
 def test_what_is_made_of_it(tmp_path: Path) -> None:
     g = noisy(exact(), 0.02, 19)
     fr = ga.FrequencyResponse(F, g, name="bode")
@@ -337,6 +342,7 @@ def test_few_frequencies_behind_a_delay_are_no_chain_that_gives_power() -> None:
     assert not any("gives power" in w for w in idn.warnings)
 
 
+@pytest.mark.long
 def test_a_chain_that_gives_power_says_so() -> None:
     """Behind a delay and a current loop of second order the nearest chain turns what is left into masses."""
     f = np.geomspace(4.0, 700.0, 200)
@@ -348,6 +354,7 @@ def test_a_chain_that_gives_power_says_so() -> None:
     assert (plain.p, plain.q) == (1, 2) and not any("gives power" in w for w in plain.warnings)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("turn", "remedy"), [(np.negative, "give -response"), (np.conj, r"numpy\.conj")])
 def test_a_response_of_another_sign_is_refused_with_the_remedy(turn: np.ufunc, remedy: str) -> None:
     g = noisy(exact(), 0.01, 20)

@@ -90,6 +90,7 @@ def test_refuses_other_loops_and_starts(rec: ga.Record) -> None:
         ga.simulate(MODEL, rec, LOOP, np.zeros(4), arithmetic="c30")
 
 
+@pytest.mark.long
 def test_the_drives_headers_need_no_library(tmp_path: Path) -> None:
     compiler, nm = shutil.which("g++"), shutil.which("nm")
     if compiler is None or nm is None:

@@ -158,6 +158,7 @@ def test_an_effect_at_the_load_is_asked_with_the_loads_signals() -> None:
     )
 
 
+@pytest.mark.long
 def test_a_diagnosis_finds_it_at_the_load() -> None:
     def fan(s: effects.Signals, coefficient: np.ndarray) -> np.ndarray:
         return -coefficient * s.velocity * np.abs(s.velocity) * np.abs(s.velocity)
@@ -260,6 +261,7 @@ def test_a_command_sees_the_signals_of_its_sample() -> None:
     np.testing.assert_allclose(torque, np.append(0.0, run.torque[:-1]), rtol=0.0, atol=1e-12)
 
 
+@pytest.mark.long
 def test_a_diagnosis_finds_a_command_where_no_torque_is_logged_and_says_where_it_does_not_look() -> None:
     registered_commands()
     command = COMMAND + 3.0 * np.sin(0.3 * np.arange(N))
@@ -315,6 +317,7 @@ def test_many_at_once_are_as_each_alone() -> None:
         simulate_values(FactorCounts(1, 0, 0, 0), names, values[:, :4], rec, CONTROLLER)
 
 
+@pytest.mark.long
 def test_a_diagnosis_finds_it_and_saves_it_by_name(tmp_path: Path) -> None:
     example = runpy.run_path(str(ROOT / "examples" / "08_own_effect.py"))
     assert not OWN

@@ -54,6 +54,7 @@ def test_the_mean_over_a_line_is_held() -> None:
     assert np.array_equal(held_torque(coarse), held_torque(rec).reshape(-1, 4).mean(axis=1))
 
 
+@pytest.mark.long
 def test_the_cause_and_the_inertia_behind_a_sampled_torque() -> None:
     """Half a line late the same data were named otherwise, and B dt/2 is 8 % of the inertia."""
     dia = ga.diagnose(logged("measured"))
@@ -73,6 +74,7 @@ def test_identify_draws_a_sampled_torque_straight_too() -> None:
     assert (found.p, found.q) == (1, 0) and abs(1.0 / found.gain / J - 1.0) < 0.005
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("seed", [2, 4, 5])
 def test_what_a_measured_torque_does_between_the_lines_is_no_shaft(seed: int) -> None:
     """A rigid motor in a velocity loop of 16 kHz, its current measured and logged at 1 kHz without noise."""

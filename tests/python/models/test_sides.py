@@ -93,6 +93,7 @@ def deviation(reference: Truth, dt: float, drive: str, loop: str, case: str) -> 
     return rms(ours - truth) / rms(truth)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("case", [*AT_LOAD, *AT_BOTH])
 @pytest.mark.parametrize("loop", ["open", "sampled", "continuous"])
 def test_effects_at_the_load_agree_with_the_fine_integrator(reference: Truth, case: str, loop: str) -> None:

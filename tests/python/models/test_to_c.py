@@ -91,6 +91,7 @@ def compiled(tmp_path_factory: pytest.TempPathFactory) -> ctypes.CDLL:
     return ctypes.CDLL(str(folder / "all.so"))
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", CASES)
 def test_c_is_what_is_simulated(compiled: ctypes.CDLL, name: str) -> None:
     model, controller, options = CASES[name]

@@ -349,6 +349,7 @@ def test_files_stay_readable() -> None:
     assert not long, f"over 400 lines: {long}"
 
 
+@pytest.mark.long
 def test_one_class_has_one_name() -> None:
     trees = [ast.parse(f.read_text()) for f in sources(PACKAGE, ".py")]
     named = Counter(node.name for tree in trees for node in tree.body if isinstance(node, ast.ClassDef))

@@ -121,6 +121,7 @@ def test_an_effect_is_its_header_one_entry_and_one_row(effect: str) -> None:
     assert naming == {*headers, IN_CORE / "list.hpp"}, "effects do not know one another"
 
 
+@pytest.mark.long
 def test_an_effect_that_nothing_else_contains_is_in_these_files_only() -> None:
     """All code that a new effect touches, shown by one that could be taken out again."""
     effect = "lugre_friction"

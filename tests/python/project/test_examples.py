@@ -73,6 +73,7 @@ def test_every_example_is_run() -> None:
     assert sorted([*CHECKS, *elsewhere]) == sorted(path.stem for path in EXAMPLES.glob("*.py"))
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("stem", CHECKS)
 def test_example(stem: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
     if stem == "09_emps" and not (Path(os.environ.get("GAIDENT_DATA", ".")) / "emps").is_dir():
@@ -93,6 +94,7 @@ TRACES = {
 }
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("trace", TRACES)
 def test_a_trace_with_its_drive_file_shows_what_is_hidden_in_it(
     trace: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]

@@ -90,6 +90,7 @@ def made_by(function: ast.AST) -> set[str]:
     return names
 
 
+@pytest.mark.long
 def test_nobody_sets_fields_of_another_object() -> None:
     found = {}
     for file in sorted(PACKAGE.rglob("*.py")):

@@ -69,6 +69,7 @@ def test_version_is_stated_once() -> None:
     assert getattr(_core, "__version__", version) == version
 
 
+@pytest.mark.long
 def test_sdist_holds_the_sources(sdist: Path) -> None:
     def files(root: Path) -> set[str]:
         parts = ("csrc", "python", "tests", "bench")

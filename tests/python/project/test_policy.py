@@ -352,6 +352,7 @@ def test_what_counts_as_a_reason() -> None:
     assert numbers_compared(f"{text}x < A * y\nx < B\nprint(C)\nx > D\nmax(n // E, F)\n") == ["A", "E", "F"]
 
 
+@pytest.mark.long
 def test_no_number_without_a_name_decides() -> None:
     texts = modules()
     assert set(TABLES) | set(DRAWN) <= set(texts)

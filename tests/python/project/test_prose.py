@@ -125,6 +125,7 @@ def faults(file: Path) -> list[str]:
     return [f"{file.relative_to(ROOT)}:{number}: {line}" for block in blocks for number, line in run_on(block)]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("folder", [PACKAGE, *(ROOT / name for name in ("csrc", "bench", "tests", "examples"))])
 def test_lines_of_prose_end_where_sentences_end(folder: Path) -> None:
     files = [f for f in sorted(folder.rglob("*")) if f.suffix in {".py", ".pyi", ".hpp", ".cpp", ".h", ".c"}]

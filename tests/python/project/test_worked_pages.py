@@ -12,6 +12,7 @@ from places import ROOT
 PAGES = runpy.run_path(str(ROOT / "docs" / "tools" / "run_pages.py"))
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("page", PAGES["WORKED"])
 def test_a_worked_page_runs_as_it_stands(page: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)

@@ -50,6 +50,7 @@ def margins_of(model: ga.Model, cascade: ga.Cascade) -> tuple[float, float, bool
     return float(loops.phase_margins[0]), float(loops.gain_margins[0]), bool(loops.stable[0])
 
 
+@pytest.mark.long
 def test_the_true_drive_keeps_the_margins_and_is_stiffer(tuned: ga.Retuning) -> None:
     assert isinstance(tuned.controller, ga.PI) and tuned.controller != GIVEN and tuned.given == GIVEN
     phase, gain, stable = margins_of(LAGGED, ga.Cascade(tuned.controller))
@@ -92,6 +93,7 @@ def test_filters_are_added_to_a_cascade_where_they_pay(found: ga.Diagnosis, tune
     assert stable and phase >= 49.5 and gain >= 8.9
 
 
+@pytest.mark.long
 def test_the_gain_of_a_position_controller_is_proposed_too(found: ga.Diagnosis) -> None:
     cascade = ga.Cascade(GIVEN, position=ga.P(5.0), position_period=2e-3, velocity_feedforward=1.0)
     result = ga.retune(found, cascade, filters=False)

@@ -147,6 +147,7 @@ def templates() -> Iterator[tuple[str, str]]:
                 yield f"{file.relative_to(PACKAGE)}:{node.lineno}", text
 
 
+@pytest.mark.long
 def test_no_sentence_that_is_made_for_both_says_a_word_of_one() -> None:
     in_c = ("export/c_source.py", "axis.py")  # names of C, and this module's own example
     found = [(place, text.replace("--torque-is", "")) for place, text in templates() if not place.startswith(in_c)]

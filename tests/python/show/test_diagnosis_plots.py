@@ -124,6 +124,7 @@ def test_torque_against_velocity_draws_both_branches_and_the_named_curve() -> No
         plot_evidence(TIME, VELOCITY, VELOCITY, FRICTION, POSITION, FRICTION, 0.1, axis="round")
 
 
+@pytest.mark.long
 def test_orders_reversals_and_residual_render() -> None:
     ripple = 0.02 * np.sin(6.0 * POSITION)
     figure = plot_evidence(
@@ -146,6 +147,7 @@ def test_orders_reversals_and_residual_render() -> None:
         assert picture(averaged).startswith(b"\x89PNG")
 
 
+@pytest.mark.long
 def test_the_evidence_at_a_glance() -> None:
     before = {"velocity": VELOCITY.copy(), "dhat": FRICTION + 0.005 * NOISE}
     simulated = VELOCITY + 0.5 * np.sin(30.0 * TIME)
@@ -166,6 +168,7 @@ def test_the_evidence_at_a_glance() -> None:
     rendered(plot_evidence(TIME, VELOCITY, simulated, FRICTION, POSITION, FRICTION, 0.1))
 
 
+@pytest.mark.long
 def test_a_motionless_and_a_long_record_render() -> None:
     still = np.zeros(300)
     noise = 0.01 * NOISE[:300]

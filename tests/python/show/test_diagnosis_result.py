@@ -406,6 +406,7 @@ def test_the_file_holds_the_whole_result(dia: ga.Diagnosis, tmp_path: Path) -> N
     assert list(tmp_path.iterdir()) == [tmp_path / "dia.json"]
 
 
+@pytest.mark.long
 def test_what_was_found_or_not_tested_is_no_size_that_could_not_show(rec: ga.Record) -> None:
     done = ga.run(DRIVE.with_effect("torque_saturation", limit=1.0), rec, CONTROLLER)
     limited = ga.diagnose(ga.Record(DT, command=rec.command, velocity=done.velocity, torque=done.torque), CONTROLLER)
@@ -441,6 +442,7 @@ def test_a_damaged_file_says_so(dia: ga.Diagnosis, tmp_path: Path, change: Any, 
     assert str(path) in str(caught.value)
 
 
+@pytest.mark.long
 def test_the_picture_renders_and_a_loaded_diagnosis_asks_for_its_records(dia: ga.Diagnosis, rec: ga.Record) -> None:
     for axis in ("rotary", "linear"):
         drawn = io.BytesIO()

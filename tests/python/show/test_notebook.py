@@ -61,6 +61,7 @@ def kernel(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Kernel]:
     started.close()
 
 
+@pytest.mark.long
 def test_a_notebook_shows_progress_results_and_figures(kernel: Kernel) -> None:
     shown = kernel.run("with ga.progress() as shown:\n    idn = ga.identify(rec, ctl, trials=1000, progress=shown)")  # some 2 s
     (first, opened), *updates = shown

@@ -114,6 +114,7 @@ def test_a_finding_beside_the_accuracy() -> None:
     assert "0.071 rad/s rms, less" in part_words(dia, few, "rotary", {})  # type: ignore[arg-type]
 
 
+@pytest.mark.long
 def test_waves_over_the_angle_bend_no_inertia_and_a_hump_over_the_velocity_bends_the_damping() -> None:
     over_angle, over_velocity = (ga.diagnose(one_mass(levels(), f, CONTROLLER), CONTROLLER, accuracy=10.0) for f in (waves, hump))
     for dia in (over_angle, over_velocity):
@@ -137,6 +138,7 @@ def test_a_wrong_accuracy_is_refused(wrong: Any) -> None:
         ga.diagnose(one_mass(levels(), hump, CONTROLLER), CONTROLLER, accuracy=wrong)
 
 
+@pytest.mark.long
 def test_quick_names_the_first_cause_and_says_so() -> None:
     record = one_mass(levels(), lambda angle, w, t: -0.1 - 0.004 * np.sin(7.0 * angle), CONTROLLER)
     quick, whole = (ga.diagnose(record, CONTROLLER, quick=q) for q in (True, False))

@@ -115,6 +115,7 @@ def test_what_a_script_unpacks_survives_what_ends_a_script() -> None:
     assert json.loads(text_of(text)) == data
 
 
+@pytest.mark.long
 def test_a_page_with_its_library_is_small(dia: ga.Diagnosis, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(parts, "picture", lambda chart: b"png")
     assert 1.2e6 < len(report_page(dia)) < 1.7e6  # without its pictures

@@ -55,6 +55,7 @@ def test_a_browser_that_does_not_answer_leaves_no_process(tmp_path: Path, monkey
         os.kill(begun[0], 0)
 
 
+@pytest.mark.long
 def test_it_draws_zooms_and_downloads_without_errors_and_without_a_network(
     browser: Browser, page: Path, result: ga.Diagnosis
 ) -> None:
@@ -104,6 +105,7 @@ def test_it_draws_zooms_and_downloads_without_errors_and_without_a_network(
     assert browser.errors == []
 
 
+@pytest.mark.long
 def test_a_phone_in_the_dark_and_a_printer(browser: Browser, page: Path) -> None:
     browser.size(390, 844, phone=True)
     browser.prefers("dark")

@@ -143,6 +143,7 @@ def test_a_summary_has_both(diagnosis: ga.Diagnosis) -> None:
     assert " rpm" in diagnosis.identification.summary(units={"velocity": "rpm"})
 
 
+@pytest.mark.long
 def test_the_page_says_whose_it_is_and_draws_in_units(record: ga.Record, diagnosis: ga.Diagnosis, tmp_path: Path) -> None:
     about = {"date": "2026-11-22", "customer": "Miller & Co", "text": "after <the> repair"}
     ga.report(diagnosis, tmp_path / "page.html", record, units=UNITS, about=about)
@@ -156,6 +157,7 @@ def test_the_page_says_whose_it_is_and_draws_in_units(record: ga.Record, diagnos
         ga.report(diagnosis, tmp_path / "page.html", record, about={"date": 2026})  # type: ignore[dict-item]
 
 
+@pytest.mark.long
 def test_the_drive_file_says_the_units(
     record: ga.Record, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

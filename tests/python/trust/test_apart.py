@@ -78,6 +78,7 @@ def test_what_a_library_does_is_an_error_that_names_the_file(
     assert capfd.readouterr() == ("", "")
 
 
+@pytest.mark.long
 @POSIX
 @pytest.mark.parametrize("does", ["exec('while True: pass')", "[sum(range(10**9)) for _ in range(100)]"])
 def test_a_library_that_does_not_end_is_stopped(does: str, log: Path, monkeypatch: pytest.MonkeyPatch) -> None:

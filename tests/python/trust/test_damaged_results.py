@@ -69,6 +69,7 @@ def used(result: ga.Identification | ga.Diagnosis | ga.Record) -> None:
     assert ga.simulate(result.model, ga.Record(1e-3, torque=np.ones(20), velocity=np.zeros(20))).shape == (20,)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", ["identification", "diagnosis", "record", "old"])
 def test_a_damaged_result_is_refused_or_can_be_used(name: str, saved: dict[str, Any], tmp_path: Path) -> None:
     """A third was loaded, and failed where it was used."""

@@ -25,6 +25,7 @@ def ran(script: str, *arguments: str) -> subprocess.CompletedProcess[str]:
     return subprocess.run(command, capture_output=True, text=True, timeout=600)
 
 
+@pytest.mark.long
 def test_damaged_files_are_read_or_refused() -> None:
     done = ran(
         "run.py",
@@ -40,6 +41,7 @@ def test_damaged_files_are_read_or_refused() -> None:
     )
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("form", "module"), [("HDF5", "h5py"), ("Parquet", "pyarrow"), ("TDMS", "nptdms"), ("MDF", "asammdf")])
 def test_damaged_files_of_other_libraries_are_read_or_refused(form: str, module: str) -> None:
     pytest.importorskip(module)

@@ -253,6 +253,7 @@ def here(kept_fleet: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> P
     return tmp_path
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", CALLS)
 def test_a_wrong_argument_is_one_error_that_is_ours(name: str, here: Path) -> None:
     function, given = CALLS[name]
@@ -322,6 +323,7 @@ def test_what_would_be_nonsense_is_refused_by_name(name: str, changed: dict[str,
         function(**{**given, **changed})
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("size", [1e-30, 1e-12, 1e6, 1e17, 1e28])
 @pytest.mark.parametrize("channel", ["command", "velocity", "torque"])
 def test_a_size_that_no_drive_has_ends_in_a_verdict_or_one_error(channel: str, size: float) -> None:

@@ -28,6 +28,7 @@ def test_a_position_that_is_constant_explains_nothing(channels: dict[str, np.nda
     assert dia.summary()
 
 
+@pytest.mark.long
 def test_a_loop_whose_command_is_0_throughout(channels: dict[str, np.ndarray]) -> None:
     part = {name: values[:250] for name, values in channels.items()}
     rec = ga.Record(1e-3, **{**part, "command": np.zeros(250)})
@@ -37,6 +38,7 @@ def test_a_loop_whose_command_is_0_throughout(channels: dict[str, np.ndarray]) -
     assert all(f.effect != "command_rate_limit" for f in dia.causes)
 
 
+@pytest.mark.long
 def test_a_loop_that_grows_beyond_all_numbers_has_no_torque_of_one_frequency() -> None:
     n = np.arange(800)
     command = (n % 50).astype(float)

@@ -36,6 +36,7 @@ TEXTS = {
 }
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", TEXTS)
 def test_a_text_takes_no_minutes(name: str, tmp_path: Path) -> None:
     """100 000 brackets in a title, or 40 000 digits before a letter, took minutes."""
@@ -99,6 +100,7 @@ def parquet(path: Path) -> None:
             writer.write_table(part)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("make", [npz, mat, hdf, parquet])
 def test_a_file_that_unpacks_to_gigabytes_is_refused(make: Callable[[Path], None], tmp_path: Path) -> None:
     path, plain = tmp_path / f"log.{make.__name__.replace('hdf', 'h5')}", tmp_path / "plain.csv"
