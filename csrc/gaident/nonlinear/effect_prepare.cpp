@@ -6,6 +6,8 @@ namespace gaident {
 
 namespace {
 
+constexpr double singular = 1e-9;  // modes that end within a substep leave the rounding of those that do not
+
 // Whether a torque changes within a substep, and whether a filter needs to know how the velocity goes there.
 struct Asked {
     bool late, filtered;
@@ -13,14 +15,14 @@ struct Asked {
 
 double resonance(const Pair<double>& f) { return f.e1 * f.e1 < 4.0 * f.e0 ? std::sqrt(f.e0) : 0.0; }
 
-// x of rows [M, y], M x = y, by Gaussian elimination; false where M is singular.
+// x of rows [M, y], M x = y, by Gaussian elimination; false where M is singular: no pivot above `least`, its numbers being about 1.
 template <std::size_t n_max>
-bool solved(int n, double (&rows)[n_max][n_max + 1], double* x) {
+bool solved(int n, double (&rows)[n_max][n_max + 1], double* x, double least) {
     for (int c = 0; c < n; ++c) {
         int pivot = c;
         for (int r = c + 1; r < n; ++r)
             if (std::abs(rows[r][c]) > std::abs(rows[pivot][c])) pivot = r;
-        if (rows[pivot][c] == 0.0) return false;
+        if (!(std::abs(rows[pivot][c]) > least)) return false;
         for (int j = 0; j <= n; ++j) std::swap(rows[c][j], rows[pivot][j]);
         for (int r = c + 1; r < n; ++r) {
             const double factor = rows[r][c] / rows[c][c];
@@ -67,7 +69,7 @@ bool same_motion(int n, const double (&G)[n_max][n_max], const double (&H)[n_max
         for (int j = 0; j < n; ++j) rows[k][j] = row[j] / size;
         rows[k][n] = wanted[k] / size;
     }
-    return solved(n, rows, x);
+    return solved(n, rows, x, 0.0);
 }
 
 // The answer y of the observer form's state to a torque that rises by 1 over the substep h, as -1/3 over its first half and 1/3 over its
@@ -105,7 +107,7 @@ void same_as_rise(int n, const double* b, const double* answer, double* rise) {
         if (i + 1 < n) rows[i][i + 1] = 1.0;
         rows[i][n] = answer[i];
     }
-    if (!solved(n, rows, rise)) std::fill(rise, rise + n, 0.0);
+    if (!solved(n, rows, rise, singular)) std::fill(rise, rise + n, 0.0);
     rise[0] /= b[0];
 }
 
@@ -140,7 +142,7 @@ void bend_of(const Delta<double>& half, const Delta<double>& whole, double rise,
     const Row first = {1.0};
     times(first, half, once);
     for (std::size_t j = 0; j < n; ++j) rows[j][n] = once[j];
-    if (!solved(static_cast<int>(n), rows, z)) return;
+    if (!solved(static_cast<int>(n), rows, z, singular)) return;
     Row in_whole = {1.0}, over = {}, next = {};
     times(first, whole, over);
     for (std::size_t k = 0; k < n; ++k) {
@@ -198,7 +200,7 @@ void rise_and_bend(const TwoMassStep& step, const TwoMassStep& half, EffectConst
         for (int k = 1; k < 3; ++k) rows[i][k] = step.phi[i][k] + (i == k ? 1.0 : 0.0);
         rows[i][3] = answer[i];
     }
-    if (!solved(3, rows, c.rise)) std::fill(c.rise, c.rise + 3, 0.0);
+    if (!solved(3, rows, c.rise, singular)) std::fill(c.rise, c.rise + 3, 0.0);
     c.rise[0] /= step.motor[0];
     // e: of w_half, for w_M+ and w_L+ in the place of the torques
     for (int i = 0; i < 2; ++i) {
@@ -206,7 +208,8 @@ void rise_and_bend(const TwoMassStep& step, const TwoMassStep& half, EffectConst
         torques[1][i] = step.motor[i] + step.coupling[i];
     }
     const double half_of[2] = {half.motor[0], half.motor[0] + half.coupling[0]};
-    const double det = torques[0][0] * torques[1][1] - torques[0][1] * torques[1][0];
+    const double both = torques[0][0] * torques[1][1], det = both - torques[0][1] * torques[1][0];
+    if (!(std::abs(det) > singular * std::abs(both))) return;  // whole half periods of an undamped shaft
     const double e[2] = {(half_of[0] * torques[1][1] - torques[0][1] * half_of[1]) / det,
                          (torques[0][0] * half_of[1] - half_of[0] * torques[1][0]) / det};
     for (int i = 0; i < 3; ++i) {

@@ -27,6 +27,8 @@ struct SeenBefore {
         R sum = c.bend_rise * rise;
         for (int i = 0; i < n && i < 2; ++i) sum = fma(c.bend_end[i], now.x[i], sum);
         for (int i = 0; i < n; ++i) sum = fma(c.bend[i], state.x[i], sum);
+        // An end that sticks does so all the time, whatever its torque does.
+        sum = greater(fma(now.x[0], now.x[0], state.x[0] * state.x[0]), R(0.0), sum, R(0.0));
         state = now;
         return sum;
     }
@@ -201,7 +203,8 @@ struct TwoMassPlant {
 template <class R>
 struct LoadedTwoMassPlant : TwoMassPlant<R> {
     static constexpr bool both_ends = true, changing = true;
-    using TwoMassPlant<R>::x, TwoMassPlant<R>::motor, TwoMassPlant<R>::coupling, TwoMassPlant<R>::correction;
+    using TwoMassPlant<R>::x, TwoMassPlant<R>::phi, TwoMassPlant<R>::motor, TwoMassPlant<R>::coupling,
+        TwoMassPlant<R>::correction;
     // Response to a unit torque at the load.
     // The coupling's pulls the motor back by what it drives the load with,
     // so that with a unit torque at the motor beside it only the load is driven.
@@ -209,20 +212,35 @@ struct LoadedTwoMassPlant : TwoMassPlant<R> {
     R free[3];                 // w_M, w_L, psi at the substep's end without friction
     bool correcting = false;   // whether the coupling is not linear,
     bool remembering = false;  // and remembers the way of its twist
+    bool rising = false;       // whether the torque rises within substeps,
+    R late[2] = {};            // and what that makes of w_L and psi: friction at the load asks for them without it
 
     LoadedTwoMassPlant(const EffectConstants<R>& c, int order) : TwoMassPlant<R>(c, order) {
         for (int i = 0; i < 3; ++i) load[i] = motor[i] + coupling[i];
     }
 
+    [[gnu::always_inline]] R risen(const EffectConstants<R>& c, const Course<R>& T) {
+        rising = true;
+        for (int i = 0; i < 2; ++i) late[i] = c.rise[i + 1] * T.rise;
+        return fma(c.rise[0], T.rise, T.mean);
+    }
     [[gnu::always_inline]] R load_velocity() const { return x[1]; }
     [[gnu::always_inline]] R load_beta() const { return load[1]; }
     [[gnu::always_inline]] R across() const { return load[0]; }  // of the motor's velocity to a torque at the load
     [[gnu::always_inline]] R back() const { return motor[1]; }   // and the other way
 
+    // A call: few models have it, and the others' code stays as it is.
+    [[gnu::noinline]] void rise() {
+        for (int i = 0; i < 3; ++i) free[i] = free[i] + fma(phi[i][2], late[1], phi[i][1] * late[0]);
+        for (int i = 0; i < 2; ++i) free[i + 1] = free[i + 1] + late[i];
+    }
+
     // T and T_L at motor and load; the friction of the substep before; the states of the effects.
     template <class States>
     [[gnu::always_inline]] void free_velocities(R T, R T_load, R friction_before, R load_friction_before, States& states) {
         for (int i = 0; i < 3; ++i) free[i] = fma(load[i], T_load, this->linear(i, T));
+        if (rising) [[unlikely]]
+            rise();
         if (!correcting) return;
         const auto with_memory = [&](R sum, auto&& asked) __attribute__((always_inline)) {
             if (!remembering) return sum;

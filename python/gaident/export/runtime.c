@@ -109,6 +109,11 @@ static int gaident_changes(const gaident_drive *k, int load) {
     return (k->effects & GAIDENT_POSITION_INERTIA) && load == k->two_masses;
 }
 
+/* Whether effects act at the load, or the coupling has a memory: what a rise of the torque makes of the state is then apart from it. */
+static int gaident_loaded(const gaident_drive *k) {
+    return k->two_masses && (k->at_load.effects || (k->effects & (GAIDENT_HYSTERETIC_COUPLING | GAIDENT_POSITION_INERTIA)));
+}
+
 static int gaident_stiff(const gaident_drive *k, int load) {
     return ((load ? &k->at_load : &k->at_motor)->effects & GAIDENT_DRY) || gaident_changes(k, load);
 }
@@ -271,7 +276,8 @@ static void gaident_masses(const gaident_drive *k, gaident_memory *s, double T, 
     for (i = 0; i < 3; ++i) {
         free[i] = fma(k->phi[3 * i], s->x[0], fma(k->motor[i], T, s->x[i])) +
                   fma(k->phi[3 * i + 2], s->x[2], k->phi[3 * i + 1] * s->x[1]);
-        free[i] = fma(load[i], T_load, free[i]);
+        free[i] = fma(load[i], T_load, free[i]) + fma(k->phi[3 * i + 2], s->late[1], k->phi[3 * i + 1] * s->late[0]);
+        if (i > 0) free[i] += s->late[i - 1];
         end[i] = fma(-load[i], s->at_load.friction, fma(-k->motor[i], s->at_motor.friction, free[i]));
     }
     now = gaident_correction(k, x0, dx0);
@@ -421,8 +427,14 @@ static double gaident_effects_step(const gaident_drive *k, gaident_memory *s, do
             T = fma(rise, k->torque_lag.mean_of_rise, fma(gap, k->torque_lag.mean, T));
             rise = fma(rise, k->torque_lag.rise_of_rise, gap * k->torque_lag.rise);
         }
-        T = fma(k->rise[0], rise, T);
-        for (i = 1; i < k->order; ++i) s->x[i] = fma(k->rise[i], rise, s->x[i]);
+        s->late[0] = s->late[1] = 0.0;
+        if (k->effects & (GAIDENT_TRANSPORT_DELAY | GAIDENT_TORQUE_LAG)) {
+            T = fma(k->rise[0], rise, T);
+            if (gaident_loaded(k))
+                for (i = 0; i < 2; ++i) s->late[i] = k->rise[i + 1] * rise;
+            else
+                for (i = 1; i < k->order; ++i) s->x[i] = fma(k->rise[i], rise, s->x[i]);
+        }
         s->at_motor.theta = s->theta;
         s->at_motor.braking = gaident_braking(&k->at_motor, s->theta);
         T += gaident_hum(&k->at_motor, s->time + 0.5 * k->h) - s->at_motor.braking;
@@ -435,6 +447,7 @@ static double gaident_effects_step(const gaident_drive *k, gaident_memory *s, do
         /* the mean of the velocity over the substep beside that of its ends */
         bend = fma(k->bend_of[1], s->x[1], fma(k->bend_of[0], s->x[0], k->bend_of[2] * rise));
         for (i = 0; i < k->order; ++i) bend = fma(k->bend[i], before[i], bend);
+        if (before[0] == 0.0 && s->x[0] == 0.0) bend = 0.0; /* it sticks */
         if (k->effects & GAIDENT_VELOCITY_DIFFERENCE) {
             y_next = gaident_difference(k, s, y_next, bend);
             bend = 0.0;

@@ -114,6 +114,7 @@ typedef struct {
     double x[GAIDENT_ORDER]; /* the mechanism */
     double stored;           /* of the controller [N m] */
     double angle, theta;     /* of the motor; in the middle of the substep, foreseen [rad] */
+    double late[2];          /* of x[1], x[2] at the substep's start, what a rise of the torque makes of them */
     double time;             /* s */
     int newest;              /* of the torques on their way */
     gaident_shaft_memory at_motor, at_load;

@@ -267,6 +267,9 @@ class Decisions:
     jump_misread: float = loop(
         0.05, "1", "of the jumps on the lines, which look as if they came early: 11 of 335 in a log of a fast resonance", SLOWER
     )
+    jumps_usual: float = loop(
+        0.05, "1", "probability of as many jumps that look early as there are, below which they are no misread ones", SLOWER
+    )
     told_time: float = loop(
         0.25, "samples", "deviation of a jump's time that the torque alone tells; else the velocity has to", SLOWER
     )

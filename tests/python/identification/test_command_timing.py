@@ -10,6 +10,7 @@ import pytest
 import gaident as ga
 from drive_rig import skip_without_library
 from gaident.control.between import between_lines, unsure_between
+from gaident.identification.replay import command_timing
 from gaident.identification.replay.command_timing import timed
 from gaident.identification.replay.timed_record import TimedRecord
 from loop_cases import PERIOD as T
@@ -48,6 +49,23 @@ def test_a_jump_in_the_first_interval_is_told_as_well(every: int) -> None:
     (found,) = timed([record(whole, every, LOOP)], LOOP)
     assert isinstance(found, TimedRecord) and found.command_between is not None
     assert means_off(found.command_between, whole, every) < 0.5
+
+
+@pytest.mark.parametrize(
+    ("every", "early", "on_lines", "all_on_lines"),
+    [
+        (8, 11, 324, True),
+        (8, 3, 7, False),
+        (4, 3, 7, False),
+        (2, 1, 4, False),
+        (2, 2, 8, False),
+        (8, 1, 0, False),
+        (2, 0, 1, True),
+    ],
+)
+def test_few_of_many_jumps_may_look_early(every: int, early: int, on_lines: int, all_on_lines: bool) -> None:
+    """Those that the torque tells; few jumps, or as many early ones as jumps at any sample have, are not on the lines."""
+    assert command_timing._on_the_lines(np.arange(early + on_lines) < early, every) == all_on_lines
 
 
 def test_short_ramps_are_told_from_jumps() -> None:

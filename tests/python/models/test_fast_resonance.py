@@ -109,10 +109,52 @@ def test_beside_friction_and_a_nonlinear_coupling_as_finer_steps_say(effect: str
     assert rms(velocity(late, steps()) - truth) < 5e-3 * changed
 
 
-@pytest.mark.parametrize("fast", [[-3e4], [-3e4, -5e4], [-1e5 + 1e5j, -1e5 - 1e5j]])
+FAST = [
+    [-3e4],
+    [-3e4, -5e4],
+    [-1e5 + 1e5j, -1e5 - 1e5j],
+    [-2e5, -2.5e5, -3e5, -3.5e5],
+    [-1e6, -2e6],
+    [-1e3 + np.pi / DT * 1j, -1e3 - np.pi / DT * 1j],
+]
+
+
+@pytest.mark.parametrize("fast", FAST)
 def test_modes_that_end_within_a_substep_are_no_obstacle(fast: list[complex]) -> None:
+    """Of two that are gone the state before the substep tells nothing: the velocity is then straight between its ends again."""
     slow = drive(100.0)
     model = ga.Model(slow.gain * float(np.prod(np.abs(fast))), [*slow.poles, *fast], slow.zeros)
-    filtered = with_effects(model, ("torque_lag", "velocity_filter"))
-    truth = velocity(filtered, steps(), substeps=32)
-    assert rms(velocity(filtered, steps()) - truth) < 2e-3 * rms(truth - velocity(model, steps()))
+    for name in ("torque_lag", "velocity_filter"):
+        truth = exact(model, (name,))
+        changed = rms(truth - velocity(model, steps()))
+        # As of a straight line: 1.6 % for the pair that swings once in two substeps, which no state at their ends shows.
+        assert rms(velocity(with_effects(model, (name,)), steps()) - truth) < 2e-2 * changed, name
+        assert rms(velocity(with_effects(model, (name,)), steps(), substeps=None) - truth) < 2e-3 * changed, name
+
+
+@pytest.mark.parametrize("name", ["velocity_filter", "velocity_observer", "velocity_difference"])
+@pytest.mark.parametrize("masses", [1, 2])
+def test_a_shaft_that_sticks_is_seen_at_rest_while_its_torque_rises(name: str, masses: int) -> None:
+    model = ga.OneMass(INERTIA, 1e-3).model() if masses == 1 else drive(200.0)
+    late = with_effects(model, ("transport_delay", name)).with_effect("coulomb_friction", torque=0.5)
+    torque = 0.4 * np.sign(steps())
+    for substeps in (None, 1):
+        assert np.all(velocity(late, torque, substeps=substeps) == 0.0)
+
+
+@pytest.mark.parametrize("late", ["transport_delay", "torque_lag"])
+@pytest.mark.parametrize(
+    ("effect", "side", "numbers"),
+    [
+        ("coulomb_friction", "load", {"torque": 0.05}),
+        ("position_inertia", "motor", {"amplitude": 0.3, "order": 1.0, "phase": 0.2}),
+    ],
+)
+def test_a_load_behind_a_stiff_damper_is_not_moved_beforehand(
+    late: str, effect: str, side: str, numbers: dict[str, float]
+) -> None:
+    """What stands for the rise of the torque is no motion of the load that its friction or its inertia would see."""
+    model = ga.TwoMass(INERTIA, 1e-3, INERTIA, 1e-3, 200.0, 30.0).model().with_effect(effect, side=side, **numbers)  # type: ignore[arg-type]
+    both = model.with_effect(late, **({"delay": 0.6e-3} if late == "transport_delay" else {"time_constant": 1e-3}))
+    truth = velocity(both, steps(), 1e-3, 64)
+    assert rms(velocity(both, steps(), 1e-3, None) - truth) < 1e-2 * rms(truth - velocity(model, steps(), 1e-3, 64))

@@ -42,7 +42,7 @@ struct VelocityObserver {
         c = {power + times, times, power - 2.0 * mean, bend, -times, power - times, mean - power, slope};
     }
     static void answer_to_bend(double a, double power, double& bend, double& slope) {
-        if (!(power > 0.0)) {  // e^-a is too small for a double; a may be infinite
+        if (a > 500.0) {  // beside e^-a nothing; a may be infinite
             bend = (12.0 - 36.0 / a) / a;
             slope = (24.0 / a - 6.0) / a;
             return;

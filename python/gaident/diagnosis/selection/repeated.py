@@ -76,19 +76,20 @@ class Repeated(SideMoves):
         return [] if best is None else [self.refitted(best.hypothesis, best.x, self.policy.long)]
 
     def behind_a_lag(self, fit: Fit) -> Fit:
-        """The fit or, where it leaves more than noise and that scores better, two masses with its effects behind a lag.
+        """The fit or, where that scores better, two masses behind a lag; only where it leaves more than noise.
 
         A shaft that is fitted without the lag has another resonance, which makes up for it, and a fit from there does not return.
         So the lag is fitted to one mass, and the resonance is searched beside it.
         """
-        lag = next((t for t in self.allowed if t.late), None)
+        lag = next((t for t in self.allowed if t.late), None)  # a filter acts as a lag of the torque does, see `EQUIVALENT`
         if lag is None or self.quiet(fit) or any(t.in_series for t in fit.parameters.terms) or (one := self.as_one(fit)) is None:
             return fit
         bare, x = one
         longer = bare.extended(lag)
         X = np.array([bare.parameters.inserted(x, np.array(row)) for row in lag.starts(fit.parameters.scales)])
         start = X[int(np.argmin(self.objective.costs(longer, X, WHITE)))]
-        return min((fit, *self.on_its_shaft(longer, start)), key=self.score)
+        found = [f for f in self.on_its_shaft(longer, start) if is_mechanism(f.parameters, f.x) and self.swings(f)]
+        return min((fit, *found), key=self.score)
 
     def restarted(self, fit: Fit, term: Term) -> Fit:
         """The best fit from an effect's starts beside the present rest: its first fit began beside other values of the rest."""

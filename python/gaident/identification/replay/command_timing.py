@@ -95,13 +95,19 @@ def _timed(rec: Record, controller: Controller) -> Record:
 def _on_the_lines(early: NDArray[np.bool_], every: int) -> bool:
     """Whether all jumps fell on the lines, of which the torque shows so many early by a sample, and the others not.
 
-    A jump at any of the `every` samples falls on the line with the probability 1/every.
     One on the line looks early with the probability `jump_misread`, as what the velocity does behind it is not known.
-    The hypothesis under which what was seen is more likely holds.
+    So many have to be usual among those, and a jump at any of the `every` samples, which is on the line with the probability
+    1/every, has to be excluded by the likelihood of all.
     """
     count, misread, anywhere = int(np.sum(early)), POLICY.jump_misread, 1.0 / every
+    if count == 0:
+        return True
+    from scipy.special import bdtrc
+
+    usual = float(bdtrc(count - 1, len(early), misread)) > POLICY.jumps_usual
     on_lines = len(early) - count
-    return bool(on_lines * np.log((1.0 - misread) / anywhere) + count * np.log(misread / (1.0 - anywhere)) >= 0.0)
+    ratio = on_lines * np.log((1.0 - misread) / anywhere) + count * np.log(misread / (1.0 - anywhere))
+    return usual and bool(2.0 * ratio > POLICY.rival_margin)  # no decision: a formula: 2 ln of the odds
 
 
 class _Seen(NamedTuple):
