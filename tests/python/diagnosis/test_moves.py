@@ -786,6 +786,7 @@ def test_elsewhere_looks_for_the_resonance_of_two_masses_beside_their_effects(mo
 
 def test_two_masses_that_leave_more_than_noise_are_tried_behind_a_lag(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(mechanisms, "LIBRARY", LIBRARY)
+    monkeypatch.setattr(model_space.ModelSpace, "swings", lambda space, fit: True)  # the toy's numbers are no mechanism
     late = replace(LAG, late=True, place="actuator")
     bench = Bench({"lag": (1.5,)}, masses=2, allowed=(A, late))
     without = bench.fit(A)
