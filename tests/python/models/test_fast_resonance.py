@@ -109,26 +109,26 @@ def test_beside_friction_and_a_nonlinear_coupling_as_finer_steps_say(effect: str
     assert rms(velocity(late, steps()) - truth) < 5e-3 * changed
 
 
-FAST = [
-    [-3e4],
-    [-3e4, -5e4],
-    [-1e5 + 1e5j, -1e5 - 1e5j],
-    [-2e5, -2.5e5, -3e5, -3.5e5],
-    [-1e6, -2e6],
-    [-1e3 + np.pi / DT * 1j, -1e3 - np.pi / DT * 1j],
+FAST: list[tuple[list[complex], float]] = [
+    ([-3e4], 2e-3),
+    ([-3e4, -5e4], 2e-3),
+    ([-1e5 + 1e5j, -1e5 - 1e5j], 2e-3),
+    ([-2e5, -2.5e5, -3e5, -3.5e5], 5e-3),
+    ([-1e6, -2e6], 4e-3),
+    ([-1e3 + np.pi / DT * 1j, -1e3 - np.pi / DT * 1j], 1.7e-2),  # swings once in two substeps: no state at their ends shows it
 ]
+"""(more poles, what one substep may leave of the change); a straight line's where the state does not show them."""
 
 
-@pytest.mark.parametrize("fast", FAST)
-def test_modes_that_end_within_a_substep_are_no_obstacle(fast: list[complex]) -> None:
+@pytest.mark.parametrize(("fast", "left"), FAST)
+def test_modes_that_end_within_a_substep_are_no_obstacle(fast: list[complex], left: float) -> None:
     """Of two that are gone the state before the substep tells nothing: the velocity is then straight between its ends again."""
     slow = drive(100.0)
     model = ga.Model(slow.gain * float(np.prod(np.abs(fast))), [*slow.poles, *fast], slow.zeros)
     for name in ("torque_lag", "velocity_filter"):
         truth = exact(model, (name,))
         changed = rms(truth - velocity(model, steps()))
-        # As of a straight line: 1.6 % for the pair that swings once in two substeps, which no state at their ends shows.
-        assert rms(velocity(with_effects(model, (name,)), steps()) - truth) < 2e-2 * changed, name
+        assert rms(velocity(with_effects(model, (name,)), steps()) - truth) < left * changed, name
         assert rms(velocity(with_effects(model, (name,)), steps(), substeps=None) - truth) < 2e-3 * changed, name
 
 
