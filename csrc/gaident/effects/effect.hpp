@@ -38,6 +38,7 @@
 //
 //   - begin(c, s, Beginning)   its state where the record begins: in motion, or under a torque
 //   - possible(p)              false where there is no such drive
+//   - bend_behind(c, before, s, bend)   the bend of what its sensor_dynamics gave, of its states before and behind the substep
 //   - tabulate(p, PreparedFor, t)   makes a `Table` t for what is not a number per lane; reach(t, steps): how many torques back it looks
 //   - later(p, delay)          its parameters with the controller's delay [s] added: so it acts where it is not in the model, too
 //

@@ -144,6 +144,14 @@ constexpr EffectSet effects_in_lanes_only() {
 }
 static_assert((effects_with(Hooks::actuator_dynamics | Hooks::sensor_dynamics).bits & ~effects_in_lanes_only().bits) == 0,
               "what has dynamics before or behind the mechanism stands apart: the loop of one candidate has no place for it");
+// Those whose output is known at the ends of a substep alone, and not its mean between them.
+constexpr EffectSet effects_known_at_ends() {
+    EffectSet set = effects_with(Hooks::sensor);
+    AllEffects::each([&]<class E>() {
+        if constexpr (hook::sensor_dynamics<E> && !hook::bend_behind<E>) set.add(effect<E>);
+    });
+    return set;
+}
 // Those that depend on the shaft's angle.
 constexpr EffectSet effects_that_turn() {
     EffectSet set;

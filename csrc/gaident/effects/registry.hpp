@@ -155,6 +155,8 @@ concept sensor = requires(C<E> c, double x) { E::sensor(c, x, x); };
 template <class E>
 concept sensor_dynamics = requires(C<E> c, S<E> s, double x) { E::sensor_dynamics(c, s, x, x); };
 template <class E>
+concept bend_behind = requires(C<E> c, S<E> s, double x) { E::bend_behind(c, s, s, x); };
+template <class E>
 concept reading = requires(C<E> c, double x) { E::reading(c, x); };
 template <class E>
 concept plant = requires(const double* p, const Factors<double>& g) { E::plant(p, g); };

@@ -37,7 +37,7 @@ public:
             if (job.loop.kind == LoopKind::servo && job.loop.servo.delay > 0.0) delay_torque(p.model, job.loop.servo.delay);
             if (p.model.effects.bits != 0 || job.own != nullptr || job.loop.kind == LoopKind::servo)
                 p.substeps = job.substeps > 0 ? job.substeps : substeps_for(p.model, job.record, job.loop, job.own != nullptr);
-            if (job.loop.kind == LoopKind::servo && job.loop.servo.differenced) p.substeps += p.substeps % 2;  // Simpson's pairs
+            if (in_pairs(p.model.effects, job.own)) p.substeps += p.substeps % 2;
         }
         std::iota(order_.begin(), order_.end(), std::size_t{0});
         std::stable_sort(order_.begin(), order_.end(),
@@ -68,6 +68,12 @@ public:
 
 private:
     enum class Write { set, add, subtract };
+
+    // Whether the mean velocity over a sample of the controller is asked for, and whether of pairs of substeps.
+    bool averaged() const { return job_.loop.kind == LoopKind::servo && job_.loop.servo.differenced; }
+    bool in_pairs(EffectSet effects, const OwnEffects* own) const {
+        return averaged() && (effects.meets(effects_known_at_ends()) || (own != nullptr && own->at(OwnPlace::sensor)));
+    }
 
     double* row(double* base, std::size_t model) const { return base == nullptr ? nullptr : base + model * samples_; }
 
@@ -167,6 +173,8 @@ private:
         run.sample_time = job_.record.sample_time;
         run.log_every = job_.record.log_every;
         run.substeps = first.substeps;
+        run.averaged = averaged();
+        run.in_pairs = in_pairs(set, own);
         run.order = first.model.linear.structure.poles();
         run.moving = first.start != nullptr;
         run.input = job_.record.input;

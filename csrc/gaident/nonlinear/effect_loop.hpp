@@ -64,7 +64,7 @@ public:
         if constexpr (Plant::both_ends) begin_at_load();
         if constexpr (!is_servo) pi_.s = c_.stored;
         else if (run.moving) pi_.rest(given, followed, w, c_.stored);
-        if (filtering()) before_.state = plant_.seen();
+        if (filtering() || averaging()) before_.state = plant_.seen();
         angle_ = R(run.start_angle);
         theta_middle_ = fma(plant_.velocity(), R(0.5 * h_), angle_);
         if (looking_back_)
@@ -110,16 +110,10 @@ private:
             for (int j = 0; j < run_.substeps; ++j) {
                 middle(here, next, (j + 0.5) * share);
                 substep(j, (static_cast<double>(n) + (j + 0.5) * share) * run_.sample_time);
-                if (filtering()) {
+                if (filtering() || averaging()) {
                     theta_ = run_.position.empty() ? angle_ : R(here + (next - here) * ((j + 1) * share));
                     time_ = (static_cast<double>(n) + (j + 1) * share) * run_.sample_time;
-                    filter();
-                }
-                if constexpr (is_servo) {
-                    if (!run_.loop.servo.differenced || j + 1 == run_.substeps) continue;
-                    theta_ = run_.position.empty() ? angle_ : R(here + (next - here) * ((j + 1) * share));
-                    time_ = (static_cast<double>(n) + (j + 1) * share) * run_.sample_time;
-                    mean_.behind_substep(j, sensed());
+                    behind_substep(j);
                 }
             }
         }
@@ -128,8 +122,25 @@ private:
     // What the controller reads: of a drive that takes the difference of its encoder's angle for the velocity, the mean over the sample.
     [[gnu::always_inline]] R sensor_over_sample() {
         if constexpr (is_servo)
-            if (run_.loop.servo.differenced) return reading(mean_.at_sample(sensed(), run_.substeps));
+            if (run_.averaged) return reading(mean_.at_sample(sensed(), run_.substeps, run_.in_pairs));
         return sensor();
+    }
+
+    // What a sensor makes of the velocity over a substep.
+    [[gnu::always_inline]] void behind_substep(int j) {
+        R bend = before_.bend(c_, plant_.seen());
+        if constexpr (!is_servo) {
+            filter(bend);
+        } else {
+            // The angle that is differenced is the one that it integrates.
+            if (run_.averaged) angle_ = fma(bend, R(h_), angle_);
+            if (filtering()) bend = filter(bend);
+            if (!run_.averaged) return;
+            if (!run_.in_pairs) mean_.over_substep(bend);
+            if (j + 1 == run_.substeps) return;
+            if (run_.in_pairs) mean_.behind_one_of_pair(j, sensed());
+            else mean_.behind_substep(sensed());
+        }
     }
 
     [[gnu::always_inline]] void continuous() {
@@ -148,7 +159,7 @@ private:
                 substep(0, (static_cast<double>(n) - 1.0 + (j + 0.5) * share) * run_.sample_time);
                 theta_ = run_.position.empty() ? angle_ : R(here + (next - here) * ((j + 1) * share));
                 time_ = (static_cast<double>(n) - 1.0 + (j + 1) * share) * run_.sample_time;
-                if (filtering()) filter();
+                if (filtering()) behind_substep(j);
                 y = sensor();
                 u_long_before = u_before;
                 u_before = u;
@@ -230,16 +241,26 @@ private:
     [[gnu::always_inline]] bool filtering() const {
         return OwnInLoop<R>::asks && run_.effects.meets(effects_with(Hooks::sensor_dynamics));
     }
-    [[gnu::always_inline]] void filter() {
-        R bend = before_.bend(c_, plant_.seen());
+    [[gnu::always_inline]] bool averaging() const { return is_servo && run_.averaged; }
+    // The filters, and the bend of what they give; in the other loops a filter behind another takes a straight line.
+    [[gnu::always_inline]] R filter(R bend) {
         Effects::chain(measured(), [&]<class E>(R x) __attribute__((always_inline)) {
             if constexpr (hook::sensor_dynamics<E> && asks<E>)
                 if (run_.effects.has<E>()) [[likely]] {
-                    x = E::sensor_dynamics(c_.effects.template of<E>(), state<E>(), x, bend);
-                    bend = R(0.0);
+                    const auto& c = c_.effects.template of<E>();
+                    auto& s = state<E>();
+                    if constexpr (is_servo && hook::bend_behind<E>) {
+                        const auto before = s;
+                        x = E::sensor_dynamics(c, s, x, bend);
+                        bend = E::bend_behind(c, before, s, bend);
+                    } else {
+                        x = E::sensor_dynamics(c, s, x, bend);
+                        bend = R(0.0);
+                    }
                 }
             return x;
         });
+        return bend;
     }
 
     // Of the last filter there is.

@@ -8,7 +8,7 @@ namespace {
 
 constexpr double singular = 1e-9;  // modes that end within a substep leave the rounding of those that do not
 
-// Whether a torque changes within a substep, and whether a filter needs to know how the velocity goes there.
+// Whether a torque changes within a substep, and whether a sensor needs to know how the velocity goes there.
 struct Asked {
     bool late, filtered;
 };
@@ -340,8 +340,9 @@ void prepare_effects(const EffectModel& model, const EffectRecord& record, const
     });
     Delta<double> whole;
     if (moving) whole = plant_of(model.linear, loop, Ts);
+    const bool averaged = loop.kind == LoopKind::servo && loop.servo.differenced;
     const Asked asked{model.effects.meets(effects_with(Hooks::actuator_dynamics)),
-                      model.effects.meets(effects_with(Hooks::sensor_dynamics))};
+                      averaged || model.effects.meets(effects_with(Hooks::sensor_dynamics))};
     if (out.two_masses) two_masses(model, h, Ts, asked, &whole, start, u, c);
     else observer(model.linear, h, substeps, asked, &whole, start, u, c);
     if (!possible) c.x[0] = any_value;

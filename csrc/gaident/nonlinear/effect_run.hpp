@@ -15,10 +15,12 @@ struct EffectRun {
     double sample_time = 0.0;  // of the controller
     int log_every = 1;         // outputs are written for the first of so many samples
     int substeps = 1;
-    int order = 0;                                                     // of the plant in observer form
-    bool two_masses = false;                                           // the coupling is not linear, or effects act at the load
-    bool moving = false;                                               // the record does not start at rest
-    std::span<const double> input;                                     // command, or torque in open loop
+    bool averaged = false;          // a servo differences an angle: the mean velocity over its sample is asked for,
+    bool in_pairs = false;          // and taken of pairs of substeps (sample_mean.hpp)
+    int order = 0;                  // of the plant in observer form
+    bool two_masses = false;        // the coupling is not linear, or effects act at the load
+    bool moving = false;            // the record does not start at rest
+    std::span<const double> input;  // command, or torque in open loop
     std::span<const double> velocity_feedforward, torque_feedforward;  // of a servo, or empty
     std::span<const double> position;                                  // measured, or empty
     double start_angle = 0.0;

@@ -173,9 +173,10 @@ class DataSet:
         return all(r.torque is not None for r in (self.read or self.records))
 
     def substeps(self, controller: Controller | None) -> int:
-        """Substeps for every model with effects that are not smooth: of a sample of log or controller, two for its mean."""
+        """Substeps for every model with effects not smooth, of a sample of log or controller; two for a mean of the log."""
         sample = self.dt if controller is None else self.dt / controller.log_every(self.dt)
-        return self.finer << min(max(math.ceil(math.log2(sample / self.finest)), int(self.differenced)), MOST_SUBSTEPS)
+        least = int(self.differenced and controller is None)
+        return self.finer << min(max(math.ceil(math.log2(sample / self.finest)), least), MOST_SUBSTEPS)
 
     @property
     def loop_only(self) -> bool:

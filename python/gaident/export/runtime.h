@@ -90,8 +90,8 @@ typedef struct {
     struct { double limit; } integrator_clamp;
     struct { double step; } command_rate_limit;
     struct { double samples, per_samples, step, last; } velocity_difference;
-    struct { double of_y, of_v, of_step, of_bend, slope_of_y, slope_of_v, slope_of_step, slope_of_bend; } velocity_observer;
-    struct { double decay, of_old, of_new, of_bend; } velocity_filter;
+    struct { double of_y, of_v, of_step, of_bend, slope_of_y, slope_of_v, slope_of_step, slope_of_bend, lag; } velocity_observer;
+    struct { double decay, of_old, of_new, of_bend, lag; } velocity_filter;
     struct { double amplitude, order, phase; } velocity_ripple;
     struct { double step; } velocity_quantisation;
 } gaident_drive;

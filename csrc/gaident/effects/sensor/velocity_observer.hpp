@@ -2,11 +2,14 @@
 //
 //     dq/dt = y + 2 omega (theta - q),   dy/dt = omega^2 (theta - q),   y/w = 1/(1 + s/omega)^2
 //
-// exact for a velocity w that is a parabola over the substep, 6 bend s (1 - s) beside the straight line between its ends: with a = omega h, d = (w+ - w)/a, g = y - w + 2 d, v = (dy/dt)/omega,
+// exact for a velocity w that is a parabola over the substep, 6 bend s (1 - s) beside the straight line between its ends:
+// with a = omega h, d = (w+ - w)/a, g = y - w + 2 d, v = (dy/dt)/omega,
 //
 //     y+ = w+ - 2 d + e^-a ((1 + a) g + a (v - d)),   v+ = d + e^-a ((1 - a) (v - d) - a g)
 //
 // and to that 6 a^2 (I2 - I3) bend and 6 a (I1 - I2 - a (I2 - I3)) bend,  I_k = int u^k e^-(a u) du, u from 0 to 1
+//
+// and its mean over the substep is that of w less (2 (y+ - y) + v+ - v)/a, whatever w does.
 #pragma once
 
 #include "../effect.hpp"
@@ -27,6 +30,7 @@ struct VelocityObserver {
     template <class R>
     struct Coefficients {
         R of_y, of_v, of_step, of_bend, slope_of_y, slope_of_v, slope_of_step, slope_of_bend;
+        R lag;  // 1/a
     };
     template <class R>
     struct State {
@@ -39,7 +43,7 @@ struct VelocityObserver {
         const double mean = Decay(a).mean;
         double bend, slope;
         answer_to_bend(a, power, bend, slope);
-        c = {power + times, times, power - 2.0 * mean, bend, -times, power - times, mean - power, slope};
+        c = {power + times, times, power - 2.0 * mean, bend, -times, power - times, mean - power, slope, 1.0 / a};
     }
     static void answer_to_bend(double a, double power, double& bend, double& slope) {
         if (a > 500.0) {  // beside e^-a nothing; a may be infinite
@@ -69,6 +73,12 @@ struct VelocityObserver {
         s.slope = fma(c.slope_of_bend, bend, fma(c.slope_of_step, step, fma(c.slope_of_v, slope, c.slope_of_y * behind)));
         s.w = w_next;
         return s.output;
+    }
+    template <class R>
+    [[gnu::always_inline]] static R bend_behind(const Coefficients<R>& c, const State<R>& before, const State<R>& s, R bend) {
+        const R ends = (before.w - before.output) + (s.w - s.output);
+        const R moved = fma(s.output - before.output, R(2.0), s.slope - before.slope);
+        return fnma(moved, c.lag, fma(ends, R(0.5), bend));
     }
 };
 
