@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import gaident as ga
-from drive_rig import skip_without_library
+from drive_rig import Noise, Plant, rig, skip_without_library
 from gaident.control.between import between_lines, unsure_between
 from gaident.identification.replay import command_timing
 from gaident.identification.replay.command_timing import timed
@@ -18,6 +18,7 @@ from loop_cases import jump_levels as levels
 from loop_cases import jump_log as record
 
 LOOP = ga.Cascade(ga.PI(0.1, 6.0), T)
+FINE = Noise(white=0.0, encoder=2 * np.pi / 2**24, differenced=True)
 FILTERED = ga.Cascade(ga.PI(0.1, 6.0, rule="backward"), T, torque_filters=(ga.LowPass(0.3e-3),))
 
 skip_without_library()
@@ -66,6 +67,21 @@ def test_a_jump_in_the_first_interval_is_told_as_well(every: int) -> None:
 def test_few_of_many_jumps_may_look_early(every: int, early: int, on_lines: int, all_on_lines: bool) -> None:
     """Those that the torque tells; few jumps, or as many early ones as jumps at any sample have, are not on the lines."""
     assert command_timing._on_the_lines(np.arange(early + on_lines) < early, every) == all_on_lines
+
+
+@pytest.mark.parametrize("resonance", [200.0, 270.0])
+def test_small_jumps_behind_large_ones_on_the_lines_are_not_taken_for_early(resonance: float) -> None:
+    """A random binary signal of 0.2 rad/s beside levels of up to 80: behind those the shaft rings between the lines."""
+    every, rng = 8, np.random.default_rng(int(resonance))
+    reduced = 9.8e-4 * 7.4e-4 / (9.8e-4 + 7.4e-4)
+    K = reduced * (2 * np.pi * resonance) ** 2
+    shaft = {"KG": K, "DG": 0.03 * reduced * 2 * np.pi * resonance}
+    loop = ga.Cascade(ga.PI(0.5, 60.0), T)
+    drive = Plant(J=9.8e-4, D=9e-4, JL=7.4e-4, DL=9e-4, kp=0.5, ki=60.0, dt=T * every, cascade=loop, **shaft)
+    large = np.repeat(rng.uniform(-80.0, 80.0, 20), 170)
+    small = np.repeat(rng.choice([-0.1, 0.1], len(large) // 2), 2)
+    log = rig(drive, np.concatenate([np.zeros(40), large + small]), {"torque_lag": {"time_constant": 0.33e-3}}, FINE, settle=0)
+    assert timed([log], loop)[0] is log
 
 
 def test_short_ramps_are_told_from_jumps() -> None:

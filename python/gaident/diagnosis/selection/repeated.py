@@ -79,7 +79,7 @@ class Repeated(SideMoves):
         """The fit or, where that scores better, two masses behind a lag; only where it leaves more than noise.
 
         A shaft that is fitted without the lag has another resonance, which makes up for it, and a fit from there does not return.
-        So the lag is fitted to one mass, and the resonance is searched beside it.
+        So the lag is fitted to one mass, and the resonance is searched beside it; then what the coupling has comes back.
         """
         lag = next((t for t in self.allowed if t.late), None)  # a filter acts as a lag of the torque does, see `EQUIVALENT`
         if lag is None or self.quiet(fit) or any(t.in_series for t in fit.parameters.terms) or (one := self.as_one(fit)) is None:
@@ -89,7 +89,17 @@ class Repeated(SideMoves):
         X = np.array([bare.parameters.inserted(x, np.array(row)) for row in lag.starts(fit.parameters.scales)])
         start = X[int(np.argmin(self.objective.costs(longer, X, WHITE)))]
         found = [f for f in self.on_its_shaft(longer, start) if is_mechanism(f.parameters, f.x) and self.swings(f)]
+        found += [self.coupled_as(fit, f) for f in found if any(t.in_coupling for t in fit.parameters.terms)]
         return min((fit, *found), key=self.score)
+
+    def coupled_as(self, fit: Fit, bare: Fit) -> Fit:
+        """Two masses with the effects that the coupling of another fit has; beside impacts by a global search nearby."""
+        hypothesis, x = bare.hypothesis, bare.x
+        for t in [t for t in fit.parameters.terms if t.in_coupling]:
+            x = hypothesis.parameters.inserted(x, fit.x[fit.parameters.slot(t.name)])
+            hypothesis = hypothesis.extended(t)
+        found = self.refitted(hypothesis, x)
+        return self.evolved(found) if found.impacts else found
 
     def restarted(self, fit: Fit, term: Term) -> Fit:
         """The best fit from an effect's starts beside the present rest: its first fit began beside other values of the rest."""

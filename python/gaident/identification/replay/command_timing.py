@@ -122,7 +122,8 @@ class _Seen(NamedTuple):
 
 
 class _Shares(NamedTuple):
-    """Shares (m,), of which the torque by itself tells so much, the command at the samples (n, r), and 2 ln(evidence) gained."""
+    """Shares (m,), which of them the torque by itself tells, beside all that it leaves around them, the command at the samples
+    (n, r), and 2 ln(evidence) gained."""
 
     share: Vector
     told: NDArray[np.bool_]
@@ -200,7 +201,8 @@ class _Timing:
             white = self.steps.whitened(off[None, :], noise)[0]
             columns = self.steps.columns(share, self.pulse, noise)
             normal = (columns.T @ columns).tocsc()
-            told = normal.diagonal() * POLICY.told_time**2 >= (unsure.every - 1) ** 2
+            known = normal.diagonal() * POLICY.told_time**2 / (unsure.every - 1) ** 2
+            told = known >= 1.0  # no decision: a formula
             seen = self.seen(share, ~told)
             normal = (normal + diags_array(seen.weight)).tocsc()
             share = np.clip(share + self.step(normal, columns.T @ white + seen.right, usual - share), 0.0, 1.0)
@@ -210,7 +212,18 @@ class _Timing:
         )
         prior = float(np.sum(((share - usual) / spread) ** 2))
         gained = lines - left + seen.gained - prior - self.log_det(normal)
-        return _Shares(share, told, unsure.early(share), gained)
+        return _Shares(share, known >= self.left_around(share, noise), unsure.early(share), gained)
+
+    def left_around(self, share: Vector, noise: Autoregression) -> Vector:
+        """Mean square of what is left around each change (m,), in variances of the noise, and no less than that.
+
+        Behind a large jump the velocity rings between the lines, and more is left than noise: a small jump there is not told.
+        """
+        size = np.cumsum(self.steps.whitened(self.off(self.unsure.early(share))[None, :], noise)[0] ** 2)
+        end = np.minimum(self.unsure.at + len(WINDOW), len(size) - 1)
+        first = np.maximum(self.unsure.at - 1, 0)
+        left: Vector = np.maximum((size[end] - size[first]) / np.maximum(end - first, 1), 1.0)
+        return left
 
     def on_lines_where_closer(self, share: Vector, noise: Autoregression) -> Vector:
         """Shares (m,), of each jump 0 where that leaves less around it: a limit between the lines makes other minima."""
