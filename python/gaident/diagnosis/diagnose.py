@@ -16,6 +16,7 @@ from gaident.diagnosis.blas import one_thread
 from gaident.diagnosis.controller.as_read import in_terms_of_the_log, outliers_of_the_log
 from gaident.diagnosis.controller.driving import Driving, driving_of
 from gaident.diagnosis.controller.form_findings import loop_of
+from gaident.diagnosis.controller.joint_numbers import better_under
 from gaident.diagnosis.explain.expected import outside_of
 from gaident.diagnosis.note import Note
 from gaident.diagnosis.records.arguments import (
@@ -27,6 +28,7 @@ from gaident.diagnosis.records.arguments import (
     noise_std_of,
     records_of,
 )
+from gaident.diagnosis.unlogged.unlogged_form import in_series, leaves_noise
 from gaident.diagnosis.work import Work
 from gaident.errors import SettingsError
 from gaident.identification.identify import identify
@@ -175,6 +177,15 @@ def diagnose(
                     work = formed
                 else:
                     work.refused(form)
+            settled = leaves_noise(work.found.space, work.final) and not in_series(work.final)
+            for rule in () if settled else work.driving.other_rules():
+                if not better_under(work.found, rule.controller, rule.found):
+                    continue
+                note(0.03, "once more, with another rule of the integral")
+                ruled = searched(work.driving.ruled(rule), most)
+                if ruled.confirms(work):
+                    work = ruled
+                    break
             given_work = work
             for _ in range(POLICY.rounds):
                 other = work.other_gains(given_work)
@@ -198,7 +209,12 @@ def diagnose(
             linear = linear if work.driving.regained_from is not None else work.idn  # a name needs more than one effect here
         driving = work.driving
         result = replace(
-            found, noise=noise_std, bootstrap=bootstrap, controller_numbers=driving.numbers, velocity_age=work.data.age
+            found,
+            noise=noise_std,
+            bootstrap=bootstrap,
+            controller_numbers=driving.numbers,
+            velocity_age=work.data.age,
+            linear_model=work.base.parameters.model(work.base.x),
         )
         result = driving.moved.noted(result)
         pairs = zip((*given, *kept), (*recorded, *apart), strict=True)

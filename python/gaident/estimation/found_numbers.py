@@ -49,6 +49,7 @@ __all__ = [
     "refined",
     "seen_in",
     "slopes",
+    "under_other",
     "variance_of",
     "worth",
 ]
@@ -64,8 +65,12 @@ def moved(data: DataSet, by: Vector) -> DataSet | None:
     assert data.found is not None and data.controller is not None
     found = data.found.moved(by)
     here, there = data.found.controller, found.controller
-    if here is None or there is None:
-        return None
+    return None if here is None or there is None else under_other(data, here, there, found)
+
+
+def under_other(data: DataSet, here: Controller, there: Controller, found: FoundNumbers | None) -> DataSet:
+    """The data of a controller as that of another one; found: the numbers of that."""
+    assert data.controller is not None
     pairs = [(_made(r, here), _made(r, there)) for r in data.read or data.records]
     driven = tuple(r.with_channels(torque=torque_in(r) + v - u) for r, (u, v) in zip(data.driven, pairs, strict=True))
     limited = there.with_limits(*data.controller.limits)

@@ -21,7 +21,7 @@ from gaident.diagnosis.controller.limit_not_given import by_a_limit
 from gaident.diagnosis.controller.log_shift import Aligned, aligned
 from gaident.diagnosis.controller.measured_lag import Lag, commanded, lag_shown
 from gaident.diagnosis.controller.other_form import other_form, other_scheme
-from gaident.diagnosis.controller.wrong_number import closer_form, with_findings, wrong_numbers
+from gaident.diagnosis.controller.wrong_number import OtherRule, closer_form, other_rules, with_findings, wrong_numbers
 from gaident.diagnosis.unlogged.other_gains import OTHER_GAINS, OtherGains
 from gaident.diagnosis.unlogged.unlogged_form import UnloggedForm
 from gaident.identification.logged_torque import comparable, corrected, not_followed
@@ -99,12 +99,26 @@ class Driving:
         named = {} if found.named is None else found.named(found.at, covariance)
         findings = tuple(replace(f, parameters=_closer(f.parameters, named.get(f.effect, {}))) for f in self.findings)
         numbers = _closer(self.numbers, named.get("", {}))
+        return replace(self._driven_anew(controller), findings=findings, numbers=numbers, found=found)
+
+    def other_rules(self) -> list[OtherRule]:
+        """The controller of a slow log with each other rule of its integral from which the torques follow too."""
+        told = any(f.effect == "integration_rule" for f in self.findings)
+        if told or self.doubts or self.controller is None:
+            return []
+        return other_rules(self.read, self.controller, self.found)
+
+    def ruled(self, other: OtherRule) -> Driving:
+        """The same under another rule of the integral, which a model of the axis shows; a finding says so."""
+        return replace(self._driven_anew(other.controller), findings=(*self.findings, other.finding), found=other.found)
+
+    def _driven_anew(self, controller: Controller) -> Driving:
+        """The same where another controller makes the torque between the lines."""
         moved = self.moved
         pairs = [[(driven_by(moved.given[r.digest], controller), r) for r in part] for part in (moved.records, moved.validation)]
         records, validation = (tuple(driven for driven, _ in part) for part in pairs)
         given = {driven.digest: moved.given[r.digest] for part in pairs for driven, r in part}
-        moved = replace(moved, records=records, validation=validation, given=given)
-        return replace(self, moved=moved, controller=controller, findings=findings, numbers=numbers, found=found)
+        return replace(self, moved=replace(moved, records=records, validation=validation, given=given), controller=controller)
 
     @property
     def driven(self) -> tuple[tuple[Record, ...], tuple[Record, ...]]:

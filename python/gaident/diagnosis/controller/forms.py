@@ -35,7 +35,7 @@ from gaident.diagnosis.controller.form_comparison import (
     shape_of,
 )
 from gaident.diagnosis.controller.form_regression import Law, law_of, quiet_law
-from gaident.diagnosis.controller.slow_forms import limited, run_error, too_fast
+from gaident.diagnosis.controller.slow_forms import follow, limited, run_error, too_fast
 from gaident.diagnosis.library.settings import ANTI_WINDUP, OF_SETTING
 from gaident.identification.replay.causes import white_noise
 from gaident.identification.replay.command_timing import timed
@@ -111,7 +111,7 @@ def _form_of(
     if not candidates:
         return None
     if law.every > 1:
-        following = _following(candidates, given, floor)
+        following = _following(records, candidates, given, floor)
         open_times = between and law.around is None and (following is None or not following.strictly)
         unsure = jumps_of(records, law.every, law.lengths) if open_times else None
         if unsure is not None:
@@ -182,11 +182,13 @@ class _Following(NamedTuple):
     strictly: bool
 
 
-def _following(candidates: Sequence[FormCandidate], given: PI, floor: float) -> _Following | None:
+def _following(records: Sequence[Record], candidates: Sequence[FormCandidate], given: PI, floor: float) -> _Following | None:
     """The first form that leaves no more than another velocity between the lines could make, or what is negligible; or None.
 
     Where the best one leaves more, the best with other filters that does not: what noise makes behind its filter no number of a
     form takes away.
+    Where none does, the best with filters from which the torque follows as it is asked of a controller that was given.
+    White noise of a measured torque is left there, too.
     """
     first = _simplest_first(candidates)
     with_filters = list({c.shape.places: c for c in reversed(candidates)}.values())
@@ -198,6 +200,11 @@ def _following(candidates: Sequence[FormCandidate], given: PI, floor: float) -> 
         follows = strictly or (best in first and rms <= POLICY.negligible * float(np.abs(law.torque).max()))
         if follows and not too_fast(controller_of(best, *fitted[:2], given, law.period), law.every * law.period):
             return _Following(best, fitted, strictly)
+    for best in (c for c in first if c.shape.places):
+        fitted = fitted_form(best, given)
+        controller = replace(controller_of(best, *fitted[:2], given, best.law.period), period=best.law.period)
+        if follow(records, controller) and not too_fast(controller, records[0].dt):
+            return _Following(best, fitted, False)
     return None
 
 

@@ -11,13 +11,16 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
+from gaident.control.controller import Controller
+from gaident.control.found import FoundNumbers
 from gaident.diagnosis.selection.moves import Moves
 from gaident.diagnosis.selection.select import Selection
 from gaident.estimation import least_squares as ls
-from gaident.estimation.found_numbers import refined, worth
+from gaident.estimation.found_numbers import refined, under_other, worth
 from gaident.estimation.objective import Fit
+from gaident.policy.table import POLICY
 
-__all__ = ["joint_numbers"]
+__all__ = ["better_under", "joint_numbers"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,6 +48,17 @@ class _Joint:
                 break
             best = shorter
         return best
+
+
+def better_under(found: Selection, controller: Controller, numbers: FoundNumbers | None) -> bool:
+    """Whether the model that was selected explains the records better under another controller, fitted there from where it is."""
+    space, final = found.space, found.final
+    data = final.predictor.data
+    assert data.controller is not None
+    other = under_other(data, data.controller, controller, numbers)
+    here = replace(space, objective=replace(space.objective, data=other))
+    fit = here.refitted(final.hypothesis.over(other), final.x, POLICY.long)
+    return here.score(fit) < space.score(final) - space.margin
 
 
 def joint_numbers(found: Selection, compared: Callable[[Selection, Fit], Selection]) -> Selection | None:

@@ -23,7 +23,7 @@ from gaident.identification.logged_torque import comparable, not_followed
 from gaident.models.starts import starts_moving
 from gaident.policy.table import POLICY
 
-__all__ = ["Limited", "limited", "run_error", "too_fast", "torque_spread"]
+__all__ = ["Limited", "follow", "limited", "run_error", "too_fast", "torque_spread"]
 
 Vector = NDArray[np.float64]
 
@@ -69,6 +69,11 @@ def run_error(records: Sequence[Record], controller: Cascade) -> float:
     return float(np.sqrt(np.mean(np.concatenate([between, at_limit]) ** 2)))
 
 
+def follow(records: Sequence[Record], controller: Cascade) -> bool:
+    """Whether all torques can be compared with this controller and follow from it, as of one that was given."""
+    return all(comparable(r, controller) for r in records) and not not_followed(records, controller)
+
+
 def too_fast(controller: Cascade, dt: float) -> bool:
     """Whether a notch of the controller lies where a log with the sample time dt [s] shows nothing."""
     # no decision: a formula: the Nyquist frequency
@@ -92,7 +97,7 @@ def limited(records: Sequence[Record], controller: Cascade) -> Limited:
         if not gain > 0.0:
             return Limited(controller, None, 0.0)
         return Limited(best, None, gain, windup=gain, time_std=_time_std(records, best))
-    if all(comparable(r, controller) for r in records) and not not_followed(records, controller):
+    if follow(records, controller):
         return Limited(controller, None, 0.0)
     parts = [np.abs(before_filters(r.torque, controller, r.dt)) for r in records if r.torque is not None]
     limit = plateau_of(np.concatenate(parts))
