@@ -14,6 +14,7 @@ from gaident.diagnosis.records.hygiene import unexplained
 from gaident.diagnosis.records.sizes import scales_of
 from gaident.diagnosis.selection.bases import Task
 from gaident.diagnosis.selection.mechanisms import on_a_shaft, resonance
+from gaident.diagnosis.selection.sensor_age import _encoder
 from gaident.estimation import least_squares as ls
 from gaident.estimation.dataset import DataSet
 from gaident.estimation.mean_velocity import means, with_middles
@@ -53,6 +54,25 @@ def test_lines_of_an_encoder_are_whole() -> None:
     beside = LINES + 1.004  # what five decimals of rpm leave of 2^20 lines: no encoder has one line more
     assert encoder_lines(w * LINES / beside, T, 2.0 * np.pi) == LINES
     assert encoder_lines(rpm, 1e-3, 2.0 * np.pi) == 0  # not 60000 lines
+
+
+@pytest.mark.parametrize(("axis", "pitch", "lead", "said"), [
+    ("linear", None, 0.01, (2**19, "in 5 mm")),
+    ("linear", 0.012, 0.012, (2**20, "in 12 mm")),
+    ("linear", None, 0.012, (2**18, "in 3 mm")),
+    ("linear", None, 0.0137, (0, "")),
+    ("linear", 0.0137, 0.0137, (2**20, "in 13.7 mm")),
+    ("rotary", None, 2.0 * np.pi, (2**20, "a turn")),
+])  # fmt: skip
+def test_lines_of_a_screws_encoder_are_counted_on_its_lead(
+    axis: str, pitch: float | None, lead: float, said: tuple[int, str]
+) -> None:
+    angle = np.cumsum(np.random.default_rng(1).uniform(-1.0, 1.0, 400)) * 0.01
+    exact = np.diff(np.round(angle / (2.0 * np.pi / LINES))) * (lead / LINES) / T
+    rounded = np.round(1e3 * exact, 4) / 1e3 if axis == "linear" else exact  # mm/s in a log of four decimals
+    rec = ga.Record(T, velocity=rounded, torque=np.ones(len(rounded)))
+    lines, words = _encoder(DataSet.of([rec], None, axis=axis, pitch=pitch), rounded, T)
+    assert (lines, str(words)) == said
 
 
 def test_the_step_of_an_encoder_is_seen_behind_the_rounding_of_a_log() -> None:

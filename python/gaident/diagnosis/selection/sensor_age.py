@@ -7,7 +7,7 @@ That is no cause: every drive that differences its encoder has this age.
 A search without it fits it as a delay or, beside a current loop, as a resonance.
 
 - Where the angle is logged and the velocity is its difference, the age is known.
-- The lattice of the velocities says how many lines the encoder had.
+- The lattice of the velocities says how many lines the encoder had, to a turn, to a metre or to a screw's lead.
   Where they are a whole number, or a power of two as far as the decimals of a log show, the velocity may be a difference.
   Not every velocity on such a lattice is one: an observer or the drive's firmware may round to it.
   So both ages are fitted, with the linear mechanism alone and with the lag of a current loop.
@@ -51,6 +51,8 @@ from gaident.models.model import Model
 from gaident.policy.table import POLICY
 
 __all__ = ["searched"]
+
+LEADS = (1e-3, 3e-3, 5e-3, 25e-3)  # no decision: m; those of ISO 3408-2, 1 to 40 mm, are these but for powers of two
 
 Vector = NDArray[np.float64]
 
@@ -107,10 +109,9 @@ def searched(
     if going_on:
         objective = Objective(data.aged(0.0, going_on), objective.weight, counter=objective.counter)
     shown = data.velocity[objective.weight > 0.0]  # what stands in an outlier's place is on no lattice
-    lines = encoder_lines(shown, data.dt / every, TURN if data.axis == "rotary" else 1.0)
+    lines, each = _encoder(data, shown, data.dt / every)
     older = Objective(data.aged(HALF / every, (0.0, *going_on)), objective.weight, counter=objective.counter)
     if lines and not _score(objective, scales, model) < _score(older, scales, model) - POLICY.rival_margin:
-        each = Text("a turn", "a metre")
         text = (
             "The velocities lie on the lattice of an encoder's {angle} ({} lines {}), differenced over one sample, "
             "and nothing speaks against it: they are taken for half a sample old ({:.3g} ms). The simulation has it; it is no "
@@ -132,6 +133,24 @@ def searched(
         if not _better(again, found, margin):
             return found, []
     return again, [_on_a_lattice(step, age)]
+
+
+def _encoder(data: DataSet, velocity: Vector, sample: float) -> tuple[int, Text]:
+    """(lines of the encoder whose angle, differenced over `sample` [s], gives these velocities, or 0, in words to what).
+
+    On a linear axis they are counted on a metre of a scale, on a pitch that was given, and on the leads of screws: encoders of
+    their motors have a power of two of lines.
+    """
+    if data.axis == "rotary":
+        return encoder_lines(velocity, sample, TURN), Text("a turn")
+    if lines := encoder_lines(velocity, sample, 1.0):
+        return lines, Text("a metre")
+    given = () if data.period is None or data.period_seen else (data.period,)
+    for lead in (*given, *LEADS):
+        lines = encoder_lines(velocity, sample, lead)
+        if lines.bit_count() == 1 or (lines and lead in given):
+            return lines, say("in {:.4g} mm", 1e3 * lead)  # no decision: a unit: in a metre
+    return 0, Text("")
 
 
 def _on_a_lattice(step: float, age: float) -> Text:
