@@ -13,6 +13,7 @@ from gaident.control.words import LOOPS
 from gaident.data.record import Record
 from gaident.drive.drive_file import COLUMNS, KEYS, Drive, read_drive_file, unfilled_of
 from gaident.errors import ControllerError, SettingsError
+from gaident.show.units import scales_of
 
 __all__ = ["drive_of", "read_all"]
 
@@ -38,7 +39,7 @@ def drive_of(args: argparse.Namespace) -> Drive:
         one_of(sections["controller"]["loop"], "loop", (*LOOPS, "open"), ControllerError)
     sections["units"] = {k: _as_number(v) for k, v in sections["units"].items()}
     sections["shift"] = {k: _as_whole(v, f"--shift {k}") for k, v in sections["shift"].items()}
-    return Drive(
+    drive = Drive(
         sections[""],
         sections["columns"],
         sections["units"],
@@ -50,6 +51,8 @@ def drive_of(args: argparse.Namespace) -> Drive:
         {key: value for key, value in sections["report"].items() if value},
         unfilled,
     )
+    scales_of(drive.units_shown, drive.axis)  # a unit that is none of this axis is said before anything is computed
+    return drive
 
 
 def _selected(args: argparse.Namespace) -> str | None:

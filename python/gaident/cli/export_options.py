@@ -19,7 +19,7 @@ FORMS = {
     "urdf": ".urdf",
     "sdf": ".sdf",
     "wpilib": ".wpilib.json",
-    "simscape": ".csv",
+    "simscape": "_simscape.csv",
 }
 """What --to takes -> how such a file ends."""
 

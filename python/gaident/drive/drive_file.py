@@ -97,7 +97,8 @@ class Drive:
     @property
     def units_shown(self) -> dict[str, Any]:
         """The units of [show] with the constants that they need; {} where none are asked for."""
-        return {**self.show, **{key: self.general[key] for key in CONSTANTS if key in self.general}} if self.show else {}
+        named = (*CONSTANTS, "screw")
+        return {**self.show, **{key: self.general[key] for key in named if key in self.general}} if self.show else {}
 
     @property
     def pitch(self) -> float | None:

@@ -9,6 +9,7 @@ from gaident.checks import one_of, real_number
 from gaident.data.formats.units import factor, of_other_axis
 from gaident.data.record import CHANNELS
 from gaident.data.torque_kind import TORQUE_KINDS, TORQUE_LOGS
+from gaident.drive.quantities import number_and_unit
 from gaident.errors import ReadError
 
 __all__ = [
@@ -85,12 +86,12 @@ def positive(value: object, name: str) -> float:
 def length(value: object, name: str) -> float:
     """A length in m; with its unit, "24 mm", too."""
     if isinstance(value, str):
-        number_, _, unit_ = value.strip().partition(" ")
+        number_, unit_ = number_and_unit(value)
         try:
-            if of_other_axis("position", unit_.strip(), "linear"):
-                raise ValueError(unit_)
-            return positive(float(number_) * factor("position", unit_.strip()), name)
-        except (ValueError, ReadError):
+            if of_other_axis("position", unit_, "linear"):
+                raise ReadError(unit_)
+            return positive(number_ * factor("position", unit_), name)
+        except ReadError:
             raise ReadError(f'{name} is {value!r}: give a length in m, or with its unit, "24 mm"') from None
     return positive(value, name)
 
@@ -98,10 +99,10 @@ def length(value: object, name: str) -> float:
 def speed(value: object, name: str) -> float:
     """A speed in rad/s or m/s; with its unit, "3000 rpm", too."""
     if isinstance(value, str):
-        number_, _, unit_ = value.strip().partition(" ")
+        number_, unit_ = number_and_unit(value)
         try:
-            return positive(float(number_) * factor("velocity", unit_.strip()), name)
-        except (ValueError, ReadError):
+            return positive(number_ * factor("velocity", unit_), name)
+        except ReadError:
             raise ReadError(f'{name} is {value!r}: give a speed in rad/s (linear: m/s), or with its unit, "3000 rpm"') from None
     return positive(value, name)
 

@@ -67,7 +67,8 @@ _OF_ONE_AXIS: dict[str, tuple[str, ...]] = {
 }
 """Units that only gains, torques and inertias of such an axis have."""
 _MAY_BE_UNKNOWN = frozenset({*UNITS, "position_gain"} - {"gain"})
-_NUMBER = re.compile(r"([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(.*)")
+_NUMBER = re.compile(r"([-+]?(?:\d+[.,]?\d*|[.,]\d+)(?:[eE][-+]?\d+)?)\s*(.*)")
+_THOUSANDS = re.compile(r"[-+]?[1-9]\d{0,2},\d{3}")  # 1,500 is one thing in one country and another in the next
 
 
 def number_or_unit(value: object, name: str) -> float | str:
@@ -87,7 +88,7 @@ def si_number(value: Any, name: str, constants: Mapping[str, Any]) -> float | No
         return real_number(value, name, ControllerError)
     if _checked(value, name, ControllerError).strip() == UNKNOWN:
         return None
-    number, unit = _parts(value)
+    number, unit = number_and_unit(value)
     _refuse_other_axis(value, name, unit, str(constants.get("axis", "rotary")))
     size, constant = _units(name)[_spelling(unit)]
     needed = constant.split()
@@ -120,9 +121,10 @@ def _checked(value: str, name: str, error: type[GaidentError]) -> str:
     names = tuple(_UNITS.get(name, {}))
     listed = ", ".join(names) if len(names) <= _LISTED else f"{', '.join(names[:_LISTED])}, ..."
     word = f', or "{UNKNOWN}"' if name in _MAY_BE_UNKNOWN else ""
-    number, unit = _parts(value)
+    number, unit = number_and_unit(value)
     if math.isnan(number):
         near = f" (did you mean {UNKNOWN!r}?)" if word and difflib.get_close_matches(value.strip().lower(), [UNKNOWN]) else ""
+        near = " (write a decimal point, and none between thousands)" if "," in value else near
         raise error(f"{name} is {value!r}{near}: give one number, a number with its unit ({listed}){word}")
     if _spelling(unit) not in _units(name):
         close = difflib.get_close_matches(_spelling(unit), _units(name), n=1)
@@ -133,10 +135,12 @@ def _checked(value: str, name: str, error: type[GaidentError]) -> str:
     return value
 
 
-def _parts(text: str) -> tuple[float, str]:
-    """(number, unit); NaN where it begins with no number."""
+def number_and_unit(text: str) -> tuple[float, str]:
+    """(number, unit) of a number with a decimal point or comma; NaN where it begins with none, or has a comma of thousands."""
     found = _NUMBER.fullmatch(text.strip())
-    return (math.nan, "") if found is None or not found[2] else (float(found[1]), found[2])
+    if found is None or not found[2] or _THOUSANDS.fullmatch(found[1]):
+        return math.nan, ""
+    return float(found[1].replace(",", ".")), found[2]
 
 
 def _units(name: str) -> dict[str, Factor]:

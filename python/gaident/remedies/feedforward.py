@@ -130,6 +130,8 @@ def _notes(result: Diagnosis, left: list[Text]) -> list[Text]:
     rows = [LIBRARY[e.key] for e in result.model.effects if e.key in LIBRARY]
     if any(row.harmonic == "friction" for row in rows):
         found.append(say("The friction changes with the {angle}: the table has its mean."))
+    if any(row.beside for row in rows):
+        found.append(say("The friction grows with the load that the gear carries: the table has that without load."))
     if any(row.time_varying for row in rows):
         found.append(say("The friction changes in the course of the record: the table has that of its start."))
     return found

@@ -41,7 +41,10 @@ FALLEN = 16.0  # no decision: a formula: time constants of the slowest pole, by 
 
 
 def frequencies_of(plants: Plants, points: int, near: int) -> Vector:
-    """Frequencies [rad/s] of each drive (S, f), up to half the sampling frequency: a common grid, `near` for each resonance."""
+    """Frequencies [rad/s] of each drive (S, f), up to half the sampling frequency: a common grid, `near` for each resonance.
+
+    A drive with fewer resonances than another, as one is damped too much to swing, has the highest frequency in their place.
+    """
     spread = np.tan(np.linspace(-WIDEST, WIDEST, near))
     highest = np.pi / plants.period
     common = np.concatenate([np.geomspace(LOWEST * highest, highest, points), np.linspace(0.0, highest, EVEN + 2)[1:-1]])
@@ -51,7 +54,8 @@ def frequencies_of(plants: Plants, points: int, near: int) -> Vector:
         swings = [r.imag + max(abs(r.real), 1e-4 * r.imag) * spread for r in roots if r.imag > 0.0]
         own = np.concatenate([common, *swings])
         rows.append(np.sort(np.where((own < highest) & (own > LOWEST * highest), own, highest)))
-    return np.array(rows)
+    most = max(map(len, rows))
+    return np.array([np.pad(row, (0, most - len(row)), constant_values=highest) for row in rows])
 
 
 def position_frequencies(period: float, points: int) -> Vector:

@@ -47,7 +47,9 @@ def run_of(result: Diagnosis | Identification, rec: Record) -> RecordView:
             used, first_held_out = "held out", 0
         elif used == "fitted" and not result.in_sample and result.held_out != VALIDATION:
             first_held_out = held_out_from(rec)
-        closed = closed_over(result.controller, (rec,), [e.name for e in result.model.effects])
+        # Where the logged torque does not follow from the controller, the figures are of models that this torque drives.
+        of_loop = result.loop_follows or rec.torque is None
+        closed = closed_over(result.controller, (rec,), [e.name for e in result.model.effects]) if of_loop else None
         aged = DataSet.of([rec], result.controller).aged(result.velocity_age)
         driven = rec if closed is not None else aged.as_old(rec)
 
@@ -55,7 +57,7 @@ def run_of(result: Diagnosis | Identification, rec: Record) -> RecordView:
             (error,) = free_run_errors(model, [(driven, 0)], aged.older(closed), closed)
             return _finite(rec.velocity - error, rec, what, notes)
 
-        before = free_run(result.identification.model, "linear")
+        before = free_run(result.linear_model or result.identification.model, "linear")
         if result.model.effects:
             extended = free_run(result.model, "extended")
     else:

@@ -60,6 +60,8 @@ class Diagnosis(WhatIf):
         How the figures of `before` and `after` were held out (see `in_sample` where they could not be).
     base_shift : mapping of str to tuple of float
         Parameter of the linear part -> (before, after).
+    linear_model : Model or None
+        The linear model of `before`, fitted to all samples; None in files of gaident 0.1.0.
     left : mapping of str to float
         Gain of each driver of what is left [BIC units].
     left_needed : float
@@ -170,6 +172,7 @@ class Diagnosis(WhatIf):
     controller_numbers: Mapping[str, Estimate] = field(default_factory=dict, hash=False)
     relevance: Relevance | None = None
     covariance: tuple[tuple[float, ...], ...] | None = None
+    linear_model: Model | None = None
     records: tuple[Record, ...] = field(default=(), compare=False, repr=False)
     validation_records: tuple[Record, ...] = field(default=(), compare=False, repr=False)
 
@@ -320,8 +323,7 @@ class Diagnosis(WhatIf):
             "identification": self.identification.to_dict(),
             "controller": None if self.controller is None else self.controller.to_dict(),
             **{name: getattr(self, name) for name in ("seed", "seconds", "simulations", "samples")},
-            "digests": list(self.digests),
-            "validation_digests": list(self.validation_digests),
+            **{name: list(getattr(self, name)) for name in ("digests", "validation_digests")},
             **{name: getattr(self, name) for name in ("noise", "bootstrap", "torque_logged", "loop_follows")},
             "line": None if self.line is None else list(self.line),
             "one_sided": dict(self.one_sided),
@@ -329,11 +331,9 @@ class Diagnosis(WhatIf):
             "log_shifts": {digest: dict(moves) for digest, moves in self.log_shifts.items()},
             "mechanics": {n: asdict(e) for n, e in self.mechanics.items()},
             "regression": None if self.regression is None else self.regression.to_dict(),
-            "regression_force_error": self.regression_force_error,
             "comparisons": [asdict(c) for c in self.comparisons],
-            "force_reason": self.force_reason,
-            "left_needed": self.left_needed,
-            "axis": self.axis,
+            **{name: getattr(self, name) for name in ("regression_force_error", "force_reason", "left_needed", "axis")},
+            "linear_model": None if self.linear_model is None else self.linear_model.to_dict(),
             "relevance": None if self.relevance is None else self.relevance.to_dict(),
             "controller_numbers": {name: asdict(e) for name, e in self.controller_numbers.items()},
             "covariance": None if self.covariance is None else [list(row) for row in self.covariance],
@@ -395,5 +395,6 @@ class Diagnosis(WhatIf):
                 axis=data.get("axis", "rotary"),
                 relevance=None if data.get("relevance") is None else Relevance.from_dict(data["relevance"]),
                 covariance=rows_of(data.get("covariance")),
+                linear_model=None if data.get("linear_model") is None else Model.from_dict(data["linear_model"]),
                 controller_numbers={name: Estimate(**e) for name, e in data.get("controller_numbers", {}).items()},
             )

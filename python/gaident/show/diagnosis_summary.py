@@ -15,7 +15,7 @@ from gaident.results.experiment import Proposal
 from gaident.results.finding import Finding
 from gaident.show.relevance_words import bent_of, part_words, relevance_words, remark_words
 from gaident.show.second_method import comparison_rows, force_rows, force_words, method_words
-from gaident.show.units import Scales, beside, scales_of
+from gaident.show.units import Scales, beside, scales_of, with_column
 from gaident.show.wording import (
     NOT_AS_GIVEN,
     SPREAD,
@@ -72,7 +72,7 @@ def diagnosis_summary(dia: Diagnosis, axis: str = "rotary", units: Mapping[str, 
         _verdict(dia, axis, scales),
         _causes(dia, axis, scales),
         _gain(dia, axis, scales),
-        _force(dia, axis),
+        _force(dia, axis, scales),
         _second_method(dia, axis),
         _next(dia, axis),
         _mechanics(dia, axis),
@@ -184,10 +184,7 @@ def _gain(dia: Diagnosis, axis: str, scales: Scales) -> list[str]:
         ("extended model", *free_run_words(dia.after)),
         ("noise of the measured velocity", number(dia.after.noise_floor), ""),
     ]
-    if v in scales:
-        shown, size = scales[v]
-        sizes = (dia.before.rmse, dia.after.rmse, dia.after.noise_floor)
-        rows = [(*row, more) for row, more in zip(rows, (f"rmse [{shown}]", *(number(size * x) for x in sizes)), strict=True)]
+    rows = with_column(rows, "rmse", (dia.before.rmse, dia.after.rmse, dia.after.noise_floor), v, scales)
     where = "IN-SAMPLE: too little data, or too little motion, to hold any out" if dia.in_sample else f"on {dia.held_out}"
     lines = [f"Free-run simulation, {where}", *table(rows if extended else [rows[0], rows[1], rows[3]])]
     if noise := noise_words(dia):
@@ -224,15 +221,13 @@ def not_the_loop_words(dia: Diagnosis) -> Text:
     return Text("The simulated controller is not the drive's (see above): these figures include its errors.")
 
 
-def _force(dia: Diagnosis, axis: str) -> list[str]:
+def _force(dia: Diagnosis, axis: str, scales: Scales) -> list[str]:
     """The force error on the held-out data."""
-    rows = force_rows(dia, axis)
+    rows = force_rows(dia, axis, scales)
     if not rows:
         return []
     where = "IN-SAMPLE" if dia.in_sample else f"on {dia.held_out}"
-    torque = "torque" if axis == "rotary" else "force"
-    head = ("", f"rms [{unit('N m', axis)}]", f"of the {torque} [%]")
-    return [f"{word('Torque', axis)} error, {where}", *table([head, *rows]), *_wrapped(force_words(dia, axis), "  ")]
+    return [f"{word('Torque', axis)} error, {where}", *table(rows), *_wrapped(force_words(dia, axis), "  ")]
 
 
 def _second_method(dia: Diagnosis, axis: str) -> list[str]:

@@ -6,24 +6,32 @@ from gaident.axis import Text, identifier_words, said, say, unit
 from gaident.policy.table import POLICY
 from gaident.results.diagnosis import Diagnosis
 from gaident.results.fitness import Comparison
+from gaident.show.units import Scales, with_column
 from gaident.show.wording import number, with_std
 
 __all__ = ["comparison_rows", "force_rows", "force_words", "method_words"]
 
 
-def force_rows(dia: Diagnosis, axis: str) -> list[tuple[str, str, str]]:
-    """(what, force error, percentage of the torque's rms); empty where no torque is logged."""
+def force_rows(dia: Diagnosis, axis: str, scales: Scales) -> list[tuple[str, ...]]:
+    """Head and (what, force error, percentage of the torque's rms), the error in the user's unit too; empty without a torque."""
     before, after = dia.before, dia.after
     fits = [("mechanism without effects", before.force_error, before.torque_rms)]
     if dia.model.effects:
         fits.append(("extended model", after.force_error, after.torque_rms))
     fits.append(("inverse-dynamics regression", dia.regression_force_error, after.torque_rms or before.torque_rms))
-    rows = [(what, number(error), f"{100.0 * error / size:.1f}") for what, error, size in fits if error is not None and size]
+    known = [(what, error, size) for what, error, size in fits if error is not None and size]
+    rows = [(what, number(error), f"{100.0 * error / size:.1f}") for what, error, size in known]
+    sizes: list[float | None] = [error for _, error, _ in known]
+    if not rows:
+        return []
     if dia.model.effects and before.force_error is None and after.force_error is not None:
         rows.insert(0, (fits[0][0], "diverges", ""))
-    if rows and after.force_floor is not None:
+        sizes.insert(0, None)
+    if after.force_floor is not None:
         rows.append(("what noise and filter leave", number(after.force_floor), ""))
-    return rows
+        sizes.append(after.force_floor)
+    si = unit("N m", axis)
+    return with_column([("", f"rms [{si}]", said(say("of the {torque} [%]"), axis)), *rows], "rms", sizes, si, scales)
 
 
 def force_words(dia: Diagnosis, axis: str) -> str:

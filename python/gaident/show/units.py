@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from matplotlib.axis import Axis
     from matplotlib.figure import Figure
 
-__all__ = ["Scales", "beside", "figure_in_units", "in_units", "scales_of", "shown_in"]
+__all__ = ["Scales", "beside", "figure_in_units", "in_units", "scales_of", "shown_in", "with_column"]
 
 Scales = Mapping[str, tuple[str, float]]
 """SI unit as the axis has it -> (the user's unit, its number in one SI unit)."""
@@ -38,7 +38,7 @@ _TITLE = re.compile(r"\[([^\]]+)\]$")
 def scales_of(units: Mapping[str, str | float] | None, axis: str) -> Scales:
     """The user's units: {"velocity": "rpm", "torque": "%", "position": "deg"}, and the constants that they need.
 
-    Constants are those of `gaident.read` (rated_torque, torque_constant, counts_per_turn).
+    Constants are those of `gaident.read` (rated_torque, torque_constant, counts_per_turn; a screw: mm, mm/s, N of a rotary axis).
     Raises SettingsError for another key and for a unit of the other kind of axis, ReadError for one that is not known or that
     lacks its constant.
     """
@@ -58,7 +58,8 @@ def scales_of(units: Mapping[str, str | float] | None, axis: str) -> Scales:
             continue
         if not isinstance(wanted, str):
             raise SettingsError(f"units: {quantity} is {wanted!r}: name a unit, for example 'rpm'")
-        if of_other_axis(quantity, wanted, axis):
+        of_motor = axis == "rotary" and constants.screw is not None  # lengths are those of its screw
+        if of_other_axis(quantity, wanted, axis) and not of_motor:
             listed = ", ".join(known_units(quantity, axis))
             raise SettingsError(f"units: {quantity} is {wanted!r}, which no {axis} axis is measured in: give one of {listed}")
         size, si = factor(quantity, wanted, constants), unit_of(rotary, axis)
@@ -73,6 +74,17 @@ def beside(scales: Scales, name: str, value: float, std: float | None, si: str) 
         return ""
     shown, size = scales[si]
     return f"{with_std(size * value, None if std is None else size * std) if std else number(size * value)} {shown}"
+
+
+def with_column(
+    rows: Sequence[tuple[str, ...]], what: str, sizes: Sequence[float | None], si: str, scales: Scales
+) -> list[tuple[str, ...]]:
+    """Rows of a table, the first its head, with their sizes [si] in the user's unit as a last column, where there is one."""
+    if si not in scales:
+        return list(rows)
+    shown, per = scales[si]
+    column = (f"{what} [{shown}]", *("" if x is None or not np.isfinite(x) else number(per * x) for x in sizes))
+    return [(*row, more) for row, more in zip(rows, column, strict=True)]
 
 
 def shown_in(result: Diagnosis | Identification, scales: Scales, axis: str) -> dict[str, object]:

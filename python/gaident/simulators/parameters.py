@@ -227,6 +227,8 @@ def _left_out(model: Model, words: list[Text]) -> list[Text]:
     rows = [LIBRARY[key] for key in kept]
     if any(row.harmonic == "friction" for row in rows):
         found.append(say("The friction changes with the {angle}: the joint has its mean."))
+    if any(row.beside for row in rows):
+        found.append(say("The friction grows with the load that the gear carries: the joint has that without load."))
     if any(row.time_varying for row in rows):
         found.append(say("The friction changes in the course of the record: the joint has that of its start."))
     if others:

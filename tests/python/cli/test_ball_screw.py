@@ -12,6 +12,8 @@ import pytest
 import gaident as ga
 from cli_cases import refusal
 from gaident.cli import main
+from gaident.drive.kinds import length, speed
+from gaident.drive.quantities import number_or_unit, si_number
 from gaident.errors import ReadError
 
 LEAD, KT, J, FRICTION = 0.01, 0.71, 3.4e-3, 0.5
@@ -69,6 +71,21 @@ def test_lengths_of_the_log_are_angles_of_the_motor(here: Path, capsys: pytest.C
     Path("drive.toml").write_text(DRIVE.replace('screw = "10 mm"\n', ""))
     assert main([*arguments, "--screw", "10 mm", "--json"]) == 0
     assert json.loads(capsys.readouterr().out)["findings"] == found["findings"]
+
+
+def test_a_unit_that_is_none_of_the_axis_is_said_before_the_work(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    Path("drive.toml").write_text(DRIVE.replace('screw = "10 mm"\n', "") + '[show]\nvelocity = "mm/s"\n')
+    told = refusal(["diagnose", "run1.csv", "--drive", "drive.toml", "--out", "dia.json"], capsys)
+    assert "'mm/s', which no rotary axis is measured in" in told and not Path("dia.json").exists()
+
+
+def test_numbers_with_a_decimal_comma_are_read_and_thousands_are_not() -> None:
+    assert si_number("0,42 Nm/(rad/s)", "kp", {}) == 0.42 and si_number("18,5 ms", "tn", {}) == pytest.approx(0.0185)
+    assert length("10,5 mm", "pitch") == pytest.approx(0.0105) and speed("1500,5 rpm", "speed") == pytest.approx(157.1320)
+    with pytest.raises(ReadError, match="write a decimal point, and none between thousands"):
+        number_or_unit("1,500 ms", "tn")
+    with pytest.raises(ReadError, match="give a length in m"):
+        length("1,500 mm", "pitch")
 
 
 def test_a_gain_of_the_other_kind_of_axis_is_refused_with_the_way_out(here: Path, capsys: pytest.CaptureFixture[str]) -> None:

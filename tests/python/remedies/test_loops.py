@@ -46,6 +46,15 @@ def loops_of(model: ga.Model, cascade: ga.Cascade, differenced: bool = False) ->
     return Loops(plants, cascade, plants.responses(frequencies_of(plants, 600, 81)))
 
 
+def test_drives_of_which_one_does_not_swing_have_as_many_frequencies() -> None:
+    damped = ga.TwoMass(JM=1e-3, DM=0.01, JL=1e-3, DL=0.01, KG=100.0, DG=2.0).model()
+    swinging = ga.TwoMass(JM=1e-3, DM=0.01, JL=1e-3, DL=0.01, KG=100.0, DG=0.01).model()
+    plants = sampled_plants([damped.linear, swinging.linear], T, 0.0, False)
+    found = frequencies_of(plants, 50, 11)
+    assert found.shape[0] == 2 and np.all(np.diff(found) >= 0.0) and found.max() <= np.pi / T
+    assert np.array_equal(np.unique(found[0]), np.unique(frequencies_of(sampled_plants([damped.linear], T, 0.0, False), 50, 11)))
+
+
 def response_of(L: Any) -> tuple[np.ndarray, np.ndarray]:
     """Frequencies [rad/s] and the response there of a system of python-control, densely where a margin is read."""
     omega = np.unique(np.concatenate([np.geomspace(1.0, np.pi / T, 400), np.linspace(1.0, np.pi / T, 500)]))

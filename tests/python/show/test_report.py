@@ -166,9 +166,29 @@ def test_wrong_use_is_refused_and_leaves_no_file(dia: ga.Diagnosis, tmp_path: Pa
     assert list(tmp_path.iterdir()) == []
 
 
+def test_the_linear_model_of_the_pictures_is_that_of_the_figures(dia: ga.Diagnosis) -> None:
+    """Both are fitted alike, and simulated in the same loop; old files have the identified model alone."""
+    assert dia.linear_model is not None
+    (run, *_) = view_of(dia, None, (), "rotary").runs
+    error = run.measured - run.linear
+    assert float(np.sqrt(np.mean(error**2))) == pytest.approx(dia.before.rmse, rel=0.3)
+    back = ga.Diagnosis.from_dict(dia.to_dict())
+    assert back.linear_model == dia.linear_model
+    older = {name: value for name, value in dia.to_dict().items() if name != "linear_model"}
+    assert ga.Diagnosis.from_dict(older).linear_model is None
+    other = replace(dia, linear_model=ga.Model(0.5 * dia.linear_model.gain, dia.linear_model.poles))
+    assert not np.allclose(view_of(other, None, (), "rotary").runs[0].linear, run.linear)
+
+
+def test_no_loop_is_drawn_over_a_controller_that_does_not_make_the_torque(dia: ga.Diagnosis) -> None:
+    (closed, *_), (driven, *_) = (view_of(replace(dia, loop_follows=f), None, (), "rotary").runs for f in (True, False))
+    assert closed.torque_logged and not np.allclose(closed.linear, driven.linear)
+    assert driven.extended is not None and np.all(np.isfinite(driven.extended))
+
+
 def test_a_run_that_runs_away_is_drawn_up_to_there(dia: ga.Diagnosis) -> None:
     model = ga.Model(dia.model.gain, [400.0])
-    wild = replace(dia, model=model, identification=replace(dia.identification, model=model), validation_records=())
+    wild = replace(dia, model=model, linear_model=model, validation_records=())
     (run,) = view_of(wild, None, (), "rotary").runs
     assert "runs away" in run.notes[0] and np.isnan(run.linear[-1]) and np.all(np.isfinite(run.linear[:10]))
     for chart in (

@@ -18,7 +18,7 @@ from gaident.results.estimate import of_axis
 from gaident.results.json_text import on_axis
 from gaident.show.chart import Band, Chart, Mark, Panel, Trace
 from gaident.show.diagnosis_summary import parameter_row
-from gaident.show.units import beside, in_units, scales_of, shown_in
+from gaident.show.units import beside, in_units, scales_of, shown_in, with_column
 from page import unpacked
 
 RPM = 60.0 / math.tau
@@ -35,6 +35,16 @@ date = "2026-11-22"
 customer = "Miller & Co"
 text = "after the repair"
 """
+
+
+def test_a_table_has_the_users_unit_as_its_last_column() -> None:
+    rows = [("", "rms [N m]"), ("linear", "0.1"), ("none", "diverges")]
+    assert with_column(rows, "rms", (0.1, None), "N m", {"N m": ("%", 50.0)}) == [
+        ("", "rms [N m]", "rms [%]"),
+        ("linear", "0.1", "5"),
+        ("none", "diverges", ""),
+    ]
+    assert with_column(rows, "rms", (0.1, None), "N m", {}) == rows
 
 
 @pytest.fixture(scope="module")
@@ -60,6 +70,10 @@ def test_the_units_and_what_they_need() -> None:
         "rad": ("deg", pytest.approx(180 / np.pi)),
     }
     assert scales_of({"velocity": "mm/s", "torque": "kN"}, "linear") == {"m/s": ("mm/s", 1e3), "N": ("kN", 1e-3)}
+    of_screw = scales_of({"velocity": "mm/s", "position": "mm", "screw": 0.01}, "rotary")
+    assert of_screw == {"rad/s": ("mm/s", pytest.approx(10.0 / math.tau)), "rad": ("mm", pytest.approx(10.0 / math.tau))}
+    with pytest.raises(SettingsError, match="'mm/s', which no rotary axis"):
+        scales_of({"velocity": "mm/s"}, "rotary")
     assert scales_of(None, "rotary") == {} and scales_of({"velocity": "rad/s"}, "rotary") == {}
     with pytest.raises(ReadError, match="needs a constant of the drive; give rated_torque"):
         scales_of({"torque": "%"}, "rotary")

@@ -36,7 +36,7 @@ def export_command(args: argparse.Namespace) -> None:
     result = load(args.result)
     if not isinstance(result, (Diagnosis, Identification)):
         raise SettingsError(f"{args.result} contains a record, no model: give what gaident identify or diagnose wrote with --out")
-    path = args.out or str(Path(args.result).with_suffix(FORMS[args.to]).name)
+    path = args.out or f"{Path(args.result).stem}{FORMS[args.to]}"
     target = target_of(path, [args.result])
     assert target is not None
     if args.out is None and target.exists():

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import base64
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 
 from gaident.axis import said, unit, velocity_unit, word
 from gaident.models.factors import gain_unit
@@ -50,6 +50,7 @@ from gaident.show.report.remedies import remedies_section
 from gaident.show.report.stability import stability_section
 from gaident.show.report.views import View
 from gaident.show.second_method import comparison_rows, force_rows, force_words, method_words
+from gaident.show.units import with_column
 from gaident.show.wording import (
     NOT_AS_GIVEN,
     SPREAD,
@@ -248,11 +249,17 @@ def _free_run(run: Fitness) -> tuple[str, Html]:
     return rmse, typeset(fit)
 
 
+def _in_units(rows: Sequence[tuple[str, ...]], what: str, sizes: Sequence[float], si: str, view: View) -> Html:
+    """A table, the first of the rows its head, with the sizes [si] in the user's unit too."""
+    head, *body = with_column(rows, what, sizes, si, view.scales)
+    return table(head, [body])
+
+
 def _gain(dia: Diagnosis, view: View, drawn: Charts) -> Section:
     axis = view.axis
     v = velocity_unit(axis)
     extended = bool(dia.model.effects)
-    rows: list[Row] = [("linear model", *_free_run(dia.before))]
+    rows: list[tuple[str, ...]] = [("linear model", *_free_run(dia.before))]
     if extended:
         rows.append(("extended model", *_free_run(dia.after)))
     rows.append(("noise of the measured velocity", number(dia.after.noise_floor), ""))
@@ -265,14 +272,15 @@ def _gain(dia: Diagnosis, view: View, drawn: Charts) -> Section:
         parts.append(box(tag("p", text), kind="warn"))
     else:
         parts.append(tag("p", "Free-run simulation on ", dia.held_out, "."))
-    parts.append(table(("", f"rmse [{v}]", "fit [%]"), [rows]))
+    sizes = [run.rmse for run in (dia.before, dia.after)[: 1 + extended]]
+    parts.append(_in_units([("", f"rmse [{v}]", "fit [%]"), *rows], "rmse", [*sizes, dia.after.noise_floor], v, view))
     if noise := noise_words(dia):
         parts.append(tag("p", typeset(said(noise, axis))))
     if not dia.loop_follows:
         parts.append(box(tag("p", typeset(said(not_the_loop_words(dia), axis))), kind="warn"))
     if extended and dia.before.rmse > 0.0:
         parts.append(tag("p", typeset(said(fall_words(dia), axis))))
-    parts += _force(dia, axis)
+    parts += _force(dia, view)
     validation = next((r for r in view.runs if r.used == "held out"), None) or next(
         (r for r in view.runs if r.held_out_from is not None), None
     )
@@ -301,14 +309,14 @@ def _gain(dia: Diagnosis, view: View, drawn: Charts) -> Section:
     return Section("gain", "Before and after", *parts)
 
 
-def _force(dia: Diagnosis, axis: str) -> list[str]:
+def _force(dia: Diagnosis, view: View) -> list[str]:
     """The force error on the same data, and the check by the regression."""
+    axis = view.axis
     parts: list[str] = []
-    rows: list[Row] = [(what, value, typeset(share)) for what, value, share in force_rows(dia, axis)]
+    rows = force_rows(dia, axis, view.scales)
     if rows:
-        torque = "torque" if axis == "rotary" else "force"
         parts += [tag("h3", f"{word('Torque', axis)} error"), tag("p", typeset(force_words(dia, axis)))]
-        parts.append(table(("", f"rms [{unit('N m', axis)}]", f"of the {torque} [%]"), [rows]))
+        parts.append(table(rows[0], [[(row[0], *map(typeset, row[1:])) for row in rows[1:]]]))
     both: list[Row] = [tuple(map(typeset, row)) for row in comparison_rows(dia, axis)]
     if both:
         parts += [tag("h3", "Check by inverse-dynamics regression"), tag("p", typeset(method_words(dia, axis)))]
