@@ -124,7 +124,7 @@ def _checked(value: str, name: str, error: type[GaidentError]) -> str:
     number, unit = number_and_unit(value)
     if math.isnan(number):
         near = f" (did you mean {UNKNOWN!r}?)" if word and difflib.get_close_matches(value.strip().lower(), [UNKNOWN]) else ""
-        near = " (write a decimal point, and none between thousands)" if "," in value else near
+        near = " (write a decimal point, and none between thousands)" if _THOUSANDS.match(value.strip()) else near
         raise error(f"{name} is {value!r}{near}: give one number, a number with its unit ({listed}){word}")
     if _spelling(unit) not in _units(name):
         close = difflib.get_close_matches(_spelling(unit), _units(name), n=1)

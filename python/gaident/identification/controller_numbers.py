@@ -142,8 +142,8 @@ def _remedy(controller: Controller, records: Sequence[Record]) -> str:
     if given and _follows(free, records):
         return f"It follows with another {' and '.join(given)}: give {' and '.join(f'{name}=None' for name in given)}"
     return (
-        "The drive's has another form: give its filters, command_weight, feedforward and limits, with None for unknown numbers, "
-        "or leave the controller out and let the torque drive the model"
+        "The drive's has another form: give its filters, command_weight, feedforward and limits, with None ('unknown' in a drive "
+        "file) for numbers that you do not know, or leave the controller out and let the torque drive the model"
     )
 
 

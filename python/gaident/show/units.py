@@ -50,7 +50,7 @@ def scales_of(units: Mapping[str, str | float] | None, axis: str) -> Scales:
     for key in units:
         one_of(key, "units: the quantity", (*_SI, *named), SettingsError)
     given = {key: real_number(value, key, SettingsError) for key, value in units.items() if key in named}
-    constants = Constants(**given)
+    constants = Constants(**{**given, **({"screw": None} if axis == "linear" else {})})
     found = {}
     for quantity, rotary in _SI.items():
         wanted = units.get(quantity)

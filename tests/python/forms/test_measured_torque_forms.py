@@ -40,6 +40,23 @@ def test_a_torque_filter_is_found_behind_the_noise_of_a_measured_torque(rule: st
     assert value == pytest.approx(LAG, rel=0.03) and abs(value - LAG) < 3.0 * std
 
 
+@pytest.mark.parametrize("rule", ["backward", "forward"])
+def test_a_rule_that_was_given_right_is_kept_and_no_finding(rule: str) -> None:
+    shown = form_shown([log_of(rule, LAG)], ga.PI(KP, KI, rule=rule), every=EVERY)
+    assert shown is not None and set(shown.numbers) == {"torque_filter"} and shown.controller.velocity.rule == rule
+
+
+def test_a_rule_that_was_given_wrong_is_a_finding_where_the_torque_tells_it() -> None:
+    exact = rig(
+        replace(DRIVE, kp=KP, cascade=ga.Cascade(ga.PI(KP, KI), period=PERIOD)),
+        np.repeat([0.0, 40.0, -30.0, 20.0, -50.0, 10.0], 250),
+        {},
+        Noise(white=0.0),
+    )
+    shown = form_shown([exact], ga.PI(KP, KI, rule="backward"), every=EVERY)
+    assert shown is not None and set(shown.numbers) == {"integration_rule"} and shown.controller.velocity.rule == "trapezoidal"
+
+
 def test_noise_of_a_measured_torque_alone_is_no_filter() -> None:
     assert form_shown([log_of("trapezoidal", 0.0)], ga.PI(KP, KI), every=EVERY) is None
 

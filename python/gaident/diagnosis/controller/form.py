@@ -55,15 +55,16 @@ class Form:
     feeds: tuple[str, ...] = ()
     starts: bool = False
     unknown: tuple[str, ...] = ()  # gains that were not given: free, and no finding
+    given_rule: str = "trapezoidal"
 
     @property
     def chosen(self) -> int:
         """Settings that differ without a number of their own."""
-        return int(self.rule != "trapezoidal") + int(self.weight == "none")
+        return int(self.rule != self.given_rule) + int(self.weight == "none")
 
     def names(self, shape: Shape) -> tuple[str, ...]:
-        """What differs from the bare PI with the given gains, in words of the findings."""
-        names = ["integration_rule"] * (self.rule != "trapezoidal") + ["other_gains"] * bool(set(self.free) - set(self.unknown))
+        """What differs from the bare PI with the given gains and rule, in words of the findings."""
+        names = ["integration_rule"] * (self.rule != self.given_rule) + ["other_gains"] * bool(set(self.free) - set(self.unknown))
         names += ["command_weight"] * (self.weight != "one")
         return (*names, *self.feeds, *dict.fromkeys(FILTER_NAMES[place] for place, _ in shape.places))
 

@@ -73,9 +73,9 @@ def _forms(given: PI, unknown: tuple[str, ...]) -> Iterator[Form]:
     gains = tuple(free for free in gains if set(unknown) <= set(free))
     feeds = ((), FEEDS[:1], FEEDS[1:], FEEDS)
     for rule, free, weight, feed, starts in product(RULES, gains, WEIGHTS, feeds, (False, True)):
-        if rule != "trapezoidal" and (not given.ki or ("kp" in free and weight != "none")):
+        if rule != given.rule and (not given.ki or ("kp" in free and weight != "none")):
             continue
-        yield Form(rule, free, weight, feed, starts, unknown)
+        yield Form(rule, free, weight, feed, starts, unknown, given.rule)
 
 
 def _candidates(law: Law, shape: Shape, given: PI, floor: float, unknown: tuple[str, ...]) -> Iterator[FormCandidate]:

@@ -22,7 +22,17 @@ from gaident.control.cascade import Cascade
 from gaident.control.found import FoundNumbers
 from gaident.control.pi import PI
 from gaident.data.record import Record
-from gaident.diagnosis.controller.form import FEEDS, FIRST_FEED, GAINS, Form, FormCandidate, controller_of, found_of, named
+from gaident.diagnosis.controller.form import (
+    FEEDS,
+    FILTER_NAMES,
+    FIRST_FEED,
+    GAINS,
+    Form,
+    FormCandidate,
+    controller_of,
+    found_of,
+    named,
+)
 from gaident.diagnosis.controller.form_between import jumps_of
 from gaident.diagnosis.controller.form_comparison import (
     Fitted,
@@ -187,8 +197,8 @@ def _following(records: Sequence[Record], candidates: Sequence[FormCandidate], g
 
     Where the best one leaves more, the best with other filters that does not: what noise makes behind its filter no number of a
     form takes away.
-    Where none does, the best with filters from which the torque follows as it is asked of a controller that was given.
-    White noise of a measured torque is left there, too.
+    Where none does, the best if it differs in filters and the rule alone, and the torque follows from it as it is asked of a
+    given controller: white noise of a measured torque is left there, too, beside which other numbers fit what they are not.
     """
     first = _simplest_first(candidates)
     with_filters = list({c.shape.places: c for c in reversed(candidates)}.values())
@@ -200,7 +210,8 @@ def _following(records: Sequence[Record], candidates: Sequence[FormCandidate], g
         follows = strictly or (best in first and rms <= POLICY.negligible * float(np.abs(law.torque).max()))
         if follows and not too_fast(controller_of(best, *fitted[:2], given, law.period), law.every * law.period):
             return _Following(best, fitted, strictly)
-    for best in (c for c in first if c.shape.places):
+    alone = {*FILTER_NAMES.values(), "integration_rule"}
+    for best in (c for c in first if c.shape.places and {*c.names} <= alone):
         fitted = fitted_form(best, given)
         controller = replace(controller_of(best, *fitted[:2], given, best.law.period), period=best.law.period)
         if follow(records, controller) and not too_fast(controller, records[0].dt):

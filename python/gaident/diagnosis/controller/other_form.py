@@ -1,6 +1,6 @@
 """The form that the logged torques show of a velocity controller that was given with more than its gains, and is not the drive's.
 
-The search is that of a bare PI with the same gains: what else was given is left out of it.
+The search is that of a PI with the same gains and rule: what else was given is left out of it.
 Findings are what differs from the given controller.
 """
 
@@ -53,13 +53,14 @@ def other_form(records: Sequence[Record], validation: Sequence[Record], given: C
     records, validation: as they were given.
     """
     cascade = cascade_of(given)
-    pi = PI(kp=cascade.velocity.kp, ki=cascade.velocity.ki)
+    pi = PI(kp=cascade.velocity.kp, ki=cascade.velocity.ki, rule=cascade.velocity.rule)
     none: dict[str, Any] = dict.fromkeys(FILTER_NAMES, ())
     around = None if cascade.position is None else replace(cascade, velocity=pi, period=None, delay=0.0, **none)
     every = {given.log_every(r.dt) for r in (*records, *validation)}
     bare = replace(around or Cascade(pi), period=cascade.period, delay=cascade.delay)
     lacking = any(getattr(r, channel) is None for r in records for channel in ("torque", *cascade.reads))
-    if lacking or (around is None and cascade == bare) or len(every) > 1 or every == {1}:
+    searched = around is None and cascade == replace(bare, velocity=replace(pi, rule="trapezoidal"))  # as a bare PI, before
+    if lacking or searched or len(every) > 1 or every == {1}:
         return None
     shown = form_shown(records, pi, (), max(every), around=around)
     if shown is None and not_followed(records, bare):
