@@ -18,6 +18,7 @@ from gaident.diagnosis.controller.driving import Driving, driving_of
 from gaident.diagnosis.controller.form_findings import loop_of
 from gaident.diagnosis.controller.joint_numbers import better_under
 from gaident.diagnosis.explain.expected import outside_of
+from gaident.diagnosis.gains import judges_selected
 from gaident.diagnosis.note import Note
 from gaident.diagnosis.records.arguments import (
     ProgressCallback,
@@ -208,13 +209,14 @@ def diagnose(
                 break
             linear = linear if work.driving.regained_from is not None else work.idn  # a name needs more than one effect here
         driving = work.driving
+        own = judges_selected(work.found.space.objective, work.final, work.at_controller.effects)
         result = replace(
             found,
             noise=noise_std,
             bootstrap=bootstrap,
             controller_numbers=driving.numbers,
             velocity_age=work.data.age,
-            linear_model=work.base.parameters.model(work.base.x),
+            linear_model=work.base.parameters.model(work.base.x) if own else work.idn.model,
         )
         result = driving.moved.noted(result)
         pairs = zip((*given, *kept), (*recorded, *apart), strict=True)

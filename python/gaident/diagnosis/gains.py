@@ -8,7 +8,7 @@ Where a record is too short for that, or one of its parts holds no motion, the f
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -118,10 +118,7 @@ def measured_gains(
     stages = _stages(final, objective, part)
     named = list(at_controller.items())
     bare = stages[0].parameters.model(stages[0].x)
-    # Not known to the identification: the velocity's age, and what the torque did between the lines of a slower log.
-    # Where nothing was found, the linear model that was selected is the one that is judged.
-    own = objective.data.slower or objective.data.age or not (final.effects or at_controller)
-    first, told = (bare, ()) if own else linear(part)
+    first, told = (bare, ()) if judges_selected(objective, final, at_controller) else linear(part)
     chain = [first]
     chain += [with_effects(bare, dict(named[:k])) for k in range(1, len(named) + 1)]
     chain += [with_effects(f.parameters.model(f.x), at_controller) for f in stages[1:]]
@@ -224,6 +221,15 @@ def with_effects(model: Model, effects: dict[str, dict[str, float]]) -> Model:
     for name, values in effects.items():
         model = model.with_effect(name, **values)
     return model
+
+
+def judges_selected(objective: Objective, final: Fit, at_controller: Mapping[str, object]) -> bool:
+    """Whether the linear model of the figures is the selected one, and not the identified one.
+
+    Not known to the identification: the velocity's age, and what the torque did between the lines of a slower log.
+    Where nothing was found, the linear model that was selected is the one that is judged.
+    """
+    return bool(objective.data.slower or objective.data.age) or not (final.effects or at_controller)
 
 
 def _stages(final: Fit, objective: Objective, part: tuple[int, ...] | None) -> list[Fit]:
