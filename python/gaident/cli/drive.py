@@ -29,6 +29,8 @@ def drive_of(args: argparse.Namespace) -> Drive:
         if name in ("columns", "units", "shift"):
             sections[name].update(_assignments(getattr(args, name, None) or [], f"--{name}"))
             continue
+        if name in ("show", "report"):  # of the file alone: --torque is a limit of `gaident experiment`, no unit
+            continue
         for key in keys:
             if (name, key) == ("controller", "drive"):  # --drive names the file
                 continue

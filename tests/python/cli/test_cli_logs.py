@@ -320,6 +320,9 @@ def test_experiment_writes_the_command_of_a_first_record(here: Path, capsys: pyt
     assert "To give them: --kp and --inertia LOW HIGH, or the drive file.\n" in said
     columns = ga.read_columns("first.csv")
     assert len(columns["time [s]"]) <= 2000 and np.abs(columns["command [rad/s]"]).max() <= 100
+    options = ["--speed", "100", "--torque", "2", "--duration", "2", "--dt", "1e-3"]
+    assert main(["experiment", *options, "--out", "same.csv"]) == 0  # the same without a drive file
+    assert Path("same.csv").read_text() == Path("first.csv").read_text() and capsys.readouterr().out.endswith("same.csv\n")
     assert main(["experiment", "--drive", "d.toml"]) == 0
     out, err = capsys.readouterr()
     assert out == Path("first.csv").read_text() and "Torque and speed limit are not promised" in err
