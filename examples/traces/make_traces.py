@@ -91,7 +91,7 @@ def robot_joint() -> None:
     run = ga.run(drive, ga.Record(T, command=command - noise, velocity=noise), controller)
     angle = np.degrees(np.append(0.0, np.cumsum(0.5 * T * (run.velocity[1:] + run.velocity[:-1]))))
     velocity = np.degrees(run.velocity + noise)
-    write("robot_joint.csv", "time_s,q_deg,dq_deg_s,motor_current_A", [t, angle, velocity, run.torque / 0.5])
+    write("robot_joint.csv", "time_s,q_deg,dq_deg_s,current_setpoint_A", [t, angle, velocity, run.torque / 0.5])
 
 
 if __name__ == "__main__":

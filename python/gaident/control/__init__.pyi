@@ -1,6 +1,7 @@
-from .cascade import Cascade, P
+from .cascade import Cascade
 from .filters import LowPass, Notch
 from .pi import PI
+from .position import P
 
 __all__ = [
     "PI",

@@ -10,14 +10,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gaident import _core
-from gaident.checks import known_keys, real_number
+from gaident.checks import known_keys, one_of, real_number
 from gaident.control import core
 from gaident.control.controller import Controller, Limiting, LoopSignals
-from gaident.control.drive_parameters import position_gain
 from gaident.control.filtering import filtered, rate_limited
 from gaident.control.filters import Filter, filter_of, filters_of
 from gaident.control.pi import PI
-from gaident.control.ticks import INTERPOLATIONS, Feedforward, Ticks, multiple_of, ticks_of
+from gaident.control.position import P
+from gaident.control.ticks import INTERPOLATIONS, SLOPES, Feedforward, Ticks, multiple_of, ticks_of
 from gaident.control.unknown import known, with_own
 from gaident.control.words import UNKNOWN
 from gaident.errors import ControllerError
@@ -28,72 +28,8 @@ Vector = NDArray[np.float64]
 
 FEEDFORWARDS = ("velocity_feedforward", "acceleration_feedforward", "friction_feedforward")
 FILTERS = ("torque_filters", "velocity_filters", "command_filters")
+WAYS = ("interpolation", "feedforward_over")
 LONGEST_DELAY = 1.0  # no decision: s, as of the effect transport_delay; what an argument may be
-
-
-@dataclass(frozen=True)
-class P:
-    """Proportional position controller: velocity command = gain (position command - position).
-
-    Parameters
-    ----------
-    gain : float
-        Kv [1/s], > 0; None: not known, and estimated by `identify` and `diagnose` where the torque is logged.
-
-    Raises
-    ------
-    ControllerError
-        For a gain that is not above 0.
-
-    Examples
-    --------
-    >>> import gaident as ga
-    >>> ga.P(40.0)
-    P(gain=40.0)
-    """
-
-    gain: float
-
-    if TYPE_CHECKING:
-
-        def __init__(self, gain: float | None) -> None: ...
-
-    def __post_init__(self) -> None:
-        if self.gain is None:
-            return
-        gain = real_number(self.gain, "gain", ControllerError)
-        if gain <= 0.0:
-            raise ControllerError(f"gain is {gain:g}: give a number > 0 [1/s]")
-        object.__setattr__(self, "gain", gain)
-
-    @classmethod
-    def from_drive(cls, drive: str, **parameters: float) -> P:
-        """Return the position controller of a gain as a drive shows it.
-
-        Parameters
-        ----------
-        drive : str
-            "el72xx", "ax5000", "ax8000", "odrive" or "simplefoc".
-        **parameters : float
-            The drive's parameter in the drive's unit; see the guide "Where to find it in your drive".
-
-        Returns
-        -------
-        P
-            With the gain Kv [1/s].
-
-        Raises
-        ------
-        ControllerError
-            For a drive whose position gain is not known, and a parameter that is missing, of another drive or not above 0.
-
-        Examples
-        --------
-        >>> import gaident as ga
-        >>> ga.P.from_drive("ax5000", s_0_0104=1.5)
-        P(gain=25.0)
-        """
-        return cls(position_gain(drive, parameters))
 
 
 @dataclass(frozen=True)
@@ -107,6 +43,7 @@ class Cascade(Controller):
         u, limited as `velocity` says -> torque_filters -> the torque that is logged, and after `delay` held for T
 
     q* is the position command; v* is its slope over the coming position period, or the velocity command; a* the slope of v*.
+    A controller that knows no coming command takes the past period: `feedforward_over`.
 
     Parameters
     ----------
@@ -131,6 +68,8 @@ class Cascade(Controller):
         The logged torque is the one before it.
     interpolation : {"straight", "smooth"}
         How a position command goes between the lines of a log that is slower than the controller.
+    feedforward_over : {"coming", "past"}
+        The position period whose slopes v* and a* are.
 
     Raises
     ------
@@ -160,6 +99,7 @@ class Cascade(Controller):
     command_filters: Sequence[Filter] = ()
     delay: float = 0.0
     interpolation: str = "straight"
+    feedforward_over: str = "coming"
 
     if TYPE_CHECKING:  # None is what is not known; whoever simulates has asked for numbers before (`gaident.control.unknown`)
 
@@ -177,6 +117,7 @@ class Cascade(Controller):
             command_filters: Sequence[Filter] = ...,
             delay: float = ...,
             interpolation: str = ...,
+            feedforward_over: str = ...,
         ) -> None: ...
 
     def __post_init__(self) -> None:
@@ -200,8 +141,8 @@ class Cascade(Controller):
         if not 0.0 <= delay <= LONGEST_DELAY:
             raise ControllerError(f"delay is {delay:g}: give seconds, from 0 to {LONGEST_DELAY:g}")
         object.__setattr__(self, "delay", delay)
-        if not isinstance(self.interpolation, str) or self.interpolation not in INTERPOLATIONS:
-            raise ControllerError(f"interpolation is {self.interpolation!r}: give {' or '.join(map(repr, INTERPOLATIONS))}")
+        one_of(self.interpolation, "interpolation", INTERPOLATIONS, ControllerError)
+        one_of(self.feedforward_over, "feedforward_over", SLOPES, ControllerError)
         if self.position is None and (self.velocity_feedforward != 0.0 or self.position_period is not None):
             given = "velocity_feedforward" if self.velocity_feedforward != 0.0 else "position_period"
             raise ControllerError(
@@ -266,11 +207,12 @@ class Cascade(Controller):
         """Controller samples for each line of a log with the sample time dt [s]; ControllerError where it is no whole number."""
         return 1 if self.period is None else multiple_of(dt, self.period, "the record's dt", "period")
 
-    def interpolations(self, dt: float) -> tuple[Cascade, ...]:
-        """See `Controller`: each interpolation of a position command."""
-        if self.position is None or self.log_every(dt) == 1:
-            return (self,)
-        return self, *(replace(self, interpolation=name) for name in INTERPOLATIONS if name != self.interpolation)
+    def readings(self, dt: float) -> tuple[Cascade, ...]:
+        """See `Controller`: each interpolation of a position command, with each slope of it that is fed forward."""
+        between = INTERPOLATIONS if self.position is not None and self.log_every(dt) > 1 else (self.interpolation,)
+        over = (self.feedforward_over,) if self.velocity_feedforward == self.acceleration_feedforward == 0.0 else SLOPES
+        ways = [(i, o) for o in over for i in between if (i, o) != (self.interpolation, self.feedforward_over)]
+        return self, *(replace(self, interpolation=i, feedforward_over=o) for i, o in ways)
 
     def position_every(self, dt: float) -> int:
         """Velocity controller's samples for each of the position controller's, in a log with the sample time dt [s]."""
@@ -283,6 +225,8 @@ class Cascade(Controller):
         source, every = self.command_of(log), self.log_every(log.dt)
         if every == 1 or source is None or self.limited or self.friction_feedforward != 0.0:
             return False
+        if self.feedforward_over != "coming" and not self.velocity_feedforward == self.acceleration_feedforward == 0.0:
+            return False  # the equation has the command's slope over the coming period
         if self.acceleration_feedforward != 0.0 and self.source_of(log) is not source:
             return False  # of what the command did between the lines the equation takes the mean alone
         if self.position is not None:
@@ -348,7 +292,9 @@ class Cascade(Controller):
         """See `Controller`; ControllerError where a number is None."""
         known(self)
         placed = 0 if self.position is None else self.position_every(dt)
-        feed = Feedforward(self.velocity_feedforward, self.acceleration_feedforward, self.friction_feedforward)
+        feed = Feedforward(
+            self.velocity_feedforward, self.acceleration_feedforward, self.friction_feedforward, self.feedforward_over
+        )
         return ticks_of(command, position, dt, self.log_every(dt), placed, feed, self.interpolation)
 
     def core_loop(self, dt: float) -> _core.Loop:
@@ -369,13 +315,13 @@ class Cascade(Controller):
         filters = {name: [f.to_dict() for f in getattr(self, name)] for name in FILTERS}
         numbers = {name: getattr(self, name) for name in ("period", "position_period", *FEEDFORWARDS, "delay")}
         position = None if self.position is None else UNKNOWN if self.position.gain is None else self.position.gain
-        between = {} if self.interpolation == "straight" else {"interpolation": self.interpolation}
+        between = {name: value for name in WAYS if (value := getattr(self, name)) != getattr(type(self), name)}
         return {"velocity": self.velocity.to_dict(), "position_gain": position, **numbers, **between, **filters}
 
     @classmethod
     def from_dict(cls, data: Mapping[str, Any]) -> Cascade:
         """Return the controller of what `to_dict` gave; raises ControllerError."""
-        allowed = ("velocity", "position_gain", "period", "position_period", *FEEDFORWARDS, *FILTERS, "delay", "interpolation")
+        allowed = ("velocity", "position_gain", "period", "position_period", *FEEDFORWARDS, *FILTERS, "delay", *WAYS)
         values: dict[str, Any] = known_keys(data, "the cascade", allowed, ("velocity",), ControllerError)
         gain = values.pop("position_gain", None)
         position = None if gain is None else P(None if gain == UNKNOWN else gain)

@@ -132,8 +132,8 @@ class Controller(ABC):
     def log_every(self, dt: float) -> int:
         """Controller samples for each line of a log with the sample time dt [s]; ControllerError where it is no whole number."""
 
-    def interpolations(self, dt: float) -> tuple[Controller, ...]:
-        """This controller, and the same with other interpolations of its command between the lines of a log, dt [s] apart."""
+    def readings(self, dt: float) -> tuple[Controller, ...]:
+        """This controller, and the same that reads its command in other ways: between lines dt [s] apart, and its slope."""
         return (self,)
 
     def command_of(self, log: LoopSignals) -> Vector | None:

@@ -15,6 +15,7 @@ from gaident.errors import ControllerError
 
 __all__ = [
     "INTERPOLATIONS",
+    "SLOPES",
     "Feedforward",
     "Ticks",
     "multiple_of",
@@ -46,11 +47,12 @@ class Ticks:
 
 @dataclass(frozen=True)
 class Feedforward:
-    """velocity: share of the position command's slope; acceleration [N m s^2/rad]; friction [N m]."""
+    """velocity: share of the position command's slope; acceleration [N m s^2/rad]; friction [N m]; over: of SLOPES."""
 
     velocity: float
     acceleration: float
     friction: float
+    over: str = "coming"
 
 
 def of_lines(command: Vector, position: Vector | None) -> Ticks:
@@ -75,10 +77,10 @@ def ticks_of(
         velocity, step = source, 1
     else:
         source, step = INTERPOLATIONS[between](command, every), placed
-        velocity = _slope(source, step, period)
+        velocity = _slope(source, step, period, feed.over)
     fed = np.zeros(0)
     if feed.acceleration != 0.0 or feed.friction != 0.0:
-        fed = feed.acceleration * _slope(velocity, step, period) + feed.friction * np.sign(velocity)
+        fed = feed.acceleration * _slope(velocity, step, period, feed.over) + feed.friction * np.sign(velocity)
     measured = np.zeros(0)
     if position is not None:
         measured = smooth_between(position, every) if position.ndim == 1 else position.ravel()
@@ -91,12 +93,14 @@ def ticks_of(
     )
 
 
-def _slope(signal: Vector, step: int, period: float) -> Vector:
-    """Slope over the coming `step` samples, made at every step-th sample and held between; the last is repeated."""
+def _slope(signal: Vector, step: int, period: float, over: str) -> Vector:
+    """Slope over the coming or the past `step` samples, made at every step-th sample and held between.
+
+    What the record does not have, before its first or behind its last sample, is the slope beside it.
+    """
     made = signal[::step]
-    slopes = np.diff(made) / (step * period)
-    slopes = np.append(slopes, slopes[-1:] if len(slopes) else 0.0)
-    return np.repeat(slopes, step)[: len(signal)]
+    slopes = np.diff(made) / (step * period) if len(made) > 1 else np.zeros(1)
+    return np.repeat(np.pad(slopes, SLOPES[over], mode="edge"), step)[: len(signal)]
 
 
 def smooth_between(line: Vector, every: int) -> Vector:
@@ -170,3 +174,6 @@ def multiple_of(long: float, short: float, name: str, of: str) -> int:
 
 INTERPOLATIONS: Mapping[str, Callable[[Vector, int], Vector]] = {"straight": at_the_clock, "smooth": profile_between}
 """How a position command may go between the lines of its log -> positions at the controller's samples."""
+
+SLOPES: Mapping[str, tuple[int, int]] = {"coming": (0, 1), "past": (1, 0)}
+"""The period that a feedforward's slopes are taken over -> slopes that a record lacks (before the first, behind the last)."""

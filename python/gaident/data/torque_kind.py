@@ -22,6 +22,7 @@ TORQUE_LOGS = (SAMPLE, MEAN, HELD, SMOOTH)
 held until the next line, or smoothly, without steps."""
 
 _BEHIND_ACTUATOR = (MEASURED_WORDS - {"motor", "servo", "real", "est", "estimate", "estimated"}) | {"sensor"}
+_CURRENT = frozenset({"current", "strom", "courant", "corrente", "corriente", "denryu", "denryuu"})
 _QUADRATURE = frozenset({"iq", "isq"})  # a drive's name for the torque-forming current that its transducers see
 _SYMBOL = re.compile(r"(?:current|torque|strom|moment|trq|tau|iq|i|m|t)(?=\w\w)")
 
@@ -30,15 +31,16 @@ def kind_of_torque(names: Iterable[str]) -> str | None:
     """ "commanded" or "measured", from a torque column's names; None where they do not say.
 
     A word for a command (reference, set point, Soll) counts before one for a measurement (actual, feedback, Ist): the actual
-    set point is a set point. `I_q` alone is the measured current.
+    set point is a set point. `I_q` alone is the measured current, and so is the motor's current; a motor's torque may be either.
 
-    >>> [kind_of_torque([name]) for name in ("Iq_ref", "Actual current [A]", "M_ist", "Iist", "I_q", "Torque")]
+    >>> [kind_of_torque([name]) for name in ("Iq_ref", "M_ist", "Iist", "I_q", "Motor current [A]", "Motor torque")]
     ['commanded', 'measured', 'measured', 'measured', 'measured', None]
     """
     words = {word for name in names for word in _split(name)}
     if words & COMMAND_WORDS:
         return COMMANDED
-    return MEASURED if words & (_BEHIND_ACTUATOR | _QUADRATURE) else None
+    of_motor = "motor" in words and bool(words & _CURRENT)
+    return MEASURED if of_motor or words & (_BEHIND_ACTUATOR | _QUADRATURE) else None
 
 
 def kind_of_column(names: Iterable[str]) -> str | None:

@@ -5,11 +5,12 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from gaident.control.cascade import FEEDFORWARDS, FILTERS, Cascade, P
+from gaident.control.cascade import FEEDFORWARDS, FILTERS, WAYS, Cascade
 from gaident.control.controller import Controller
 from gaident.control.drive_parameters import CONSTANTS, DRIVES, drive_row
 from gaident.control.filters import LowPass, Notch, filter_of
 from gaident.control.pi import DIGITAL, PI
+from gaident.control.position import P
 from gaident.control.words import UNKNOWN
 from gaident.drive.kinds import Check, number, text
 from gaident.drive.quantities import INERTIA, INTEGRAL_TIMES, number_or_unit, si_number
@@ -47,7 +48,7 @@ PI_KEYS: dict[str, Check] = {
 AROUND: dict[str, Check] = {
     **dict.fromkeys(("period", "position_gain", "position_period", *FEEDFORWARDS, "delay"), number_or_unit),
     **dict.fromkeys(FILTERS, _filters),
-    "interpolation": text,
+    **dict.fromkeys(WAYS, text),
 }
 # What the motor has stands above the first section, where the units of the log need it too.
 OF_DRIVES = tuple(

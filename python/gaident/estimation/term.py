@@ -62,7 +62,7 @@ class Term:
     steps: of each coordinate, a change that matters.
     0 where a search chooses it, not a slope (an order, of a period that is known).
     nested: names of simpler effects that this one contains.
-    family: of effects that exclude each other in one model, "" for none.
+    family: of effects that exclude each other in one model, but for a steep drag beside friction with a level; "" for none.
     excludes: names of other effects that cannot be in the same model.
     beside: names of effects of which one must be in the model, because this one depends on its torque; empty where none must.
     """
@@ -91,6 +91,7 @@ class Term:
     multimodal: bool = False  # one stop or impact more makes another local minimum: fitted in the loop first, searched globally
     domains: frozenset[str] = frozenset()  # signals whose free function imitates it
     levels: bool = False  # its first coordinate is the level of dry friction
+    steep: bool = False  # a drag that rises more steeply from rest than in proportion to the velocity
     time_varying: bool = False  # its size changes in the course of a record: a mean over the record is none of its parameters
     at_peaks: bool = False  # it acts at the largest torques only
     smooth: bool = True  # what it makes of a small change is small; a function of the user's may round, or jump at a threshold
@@ -107,6 +108,13 @@ class Term:
     def stands_with(self, effects: Iterable[str]) -> bool:
         """Whether a model with these effects contains what its torque depends on."""
         return not self.beside or not self.beside.isdisjoint(effects)
+
+    def excluded_in(self, there: Iterable[Term]) -> bool:
+        """Whether a model with these effects contains another of its family that says the same.
+
+        A drag has no level, and dry friction no course over the velocity: the friction of an axis may be both.
+        """
+        return any(self.family and t.family == self.family and not (self.steep ^ t.steep) for t in there)
 
     @cached_property
     def size(self) -> int:

@@ -33,7 +33,7 @@ from gaident.errors import ControllerError, RecordError
 from gaident.estimation.criterion import effective_samples, gained
 from gaident.identification import number_words
 from gaident.identification.logged_stretches import centred, correlation, log_of, numbered, unlimited, whitened
-from gaident.identification.number_ranges import SMALLEST, grid_of, inverse, off_bound, range_of, slopes
+from gaident.identification.number_ranges import SMALLEST, exchanged, grid_of, inverse, off_bound, range_of, slopes
 from gaident.policy.table import POLICY
 from gaident.results.estimate import Estimate
 
@@ -75,7 +75,7 @@ class Numbers:
 def with_estimates(records: Sequence[Record], controller: Controller | None) -> Numbers:
     """The controller with numbers for what is None, estimated from the records.
 
-    Where its command may go in several ways between the lines, the given one, but where the torque follows only, or clearly
+    Where its command may be read in several ways, the given one, but where the torque follows only, or clearly
     better, with another: a note says so.
     Raises RecordError where a record lacks the torque or what the controller reads.
     """
@@ -84,13 +84,13 @@ def with_estimates(records: Sequence[Record], controller: Controller | None) -> 
     for rec in records:
         if why := number_words.lacking(rec, controller):
             raise RecordError(why)
-    given, *others = [_estimated(records, one) for one in controller.interpolations(records[0].dt)]
+    given, *others = [_estimated(records, one) for one in controller.readings(records[0].dt)]
     best = min((n for n in others if not n.doubt), key=lambda n: n.rms, default=given)
     gain = gained(given.rms**2, best.rms**2, min(given.samples, best.samples))
     as_good = given.rms <= POLICY.negligible * given.size or gain <= POLICY.rival_margin
     if best is given or best.controller is None or (not given.doubt and as_good):
         return given
-    return replace(best, notes=(*best.notes, number_words.other_interpolation(best.controller, controller)))
+    return replace(best, notes=(*best.notes, number_words.other_reading(best.controller, controller)))
 
 
 def _estimated(records: Sequence[Record], controller: Controller) -> Numbers:
@@ -99,9 +99,12 @@ def _estimated(records: Sequence[Record], controller: Controller) -> Numbers:
     records = sorted(records, key=lambda r: (r.digest, r.name))  # no sum depends on the order in which they were given
     numbers, shift = _shifted(controller, unknown, records, _solved(controller, unknown, records))
     values = {name: float(x) for name, x in zip(unknown, numbers.values, strict=True)}
+    twin = numbers.twin
+    apart = np.zeros(len(unknown)) if twin is None else twin - numbers.values
+    stds = np.hypot(numbers.stds, apart).tolist()
     estimates = {
         name: Estimate(value, std, UNITS[field_of(name)], at_bound, std < abs(value))
-        for (name, value), std, at_bound in zip(values.items(), numbers.stds, numbers.at_bound, strict=True)
+        for (name, value), std, at_bound in zip(values.items(), stds, numbers.at_bound, strict=True)
     }
     doubt = ""
     hidden = [name for name, seen in zip(unknown, numbers.seen, strict=True) if not seen or estimates[name].at_bound]
@@ -111,19 +114,22 @@ def _estimated(records: Sequence[Record], controller: Controller) -> Numbers:
         doubt = number_words.negative(*negative[0], estimates[negative[0][0]].unit)
     elif hidden:
         doubt = number_words.not_shown(hidden[0], estimates[hidden[0]])
-    notes = (number_words.found(estimates, numbers.rms, numbers.size), *((number_words.moved(shift),) if shift else ()))
+    notes = [number_words.found(estimates, numbers.rms, numbers.size)]
+    notes += [number_words.exchangeable(dict(zip(unknown, twin.tolist(), strict=True)))] if twin is not None else []
+    notes += [number_words.moved(shift)] if shift else []
 
     def made(x: Vector) -> Controller:
         return controller.with_numbers(dict(zip(unknown, map(float, x), strict=True)))
 
     def named(x: Vector, spread: Matrix) -> dict[str, dict[str, tuple[float, float]]]:
-        return {"": {n: (float(v), float(s)) for n, v, s in zip(unknown, x, np.sqrt(np.diag(spread)), strict=True)}}
+        pairs = zip(unknown, x, np.hypot(np.sqrt(np.diag(spread)), apart), strict=True)
+        return {"": {n: (float(v), float(s)) for n, v, s in pairs}}
 
     low = np.array([0.0 if field_of(name) in (*BOUNDED, *LOGARITHMIC, "numerator_damping") else -np.inf for name in unknown])
     spread = loosened(numbers.covariance) if any(controller.log_every(r.dt) > 1 for r in records) else numbers.covariance
     found = FoundNumbers(made, numbers.values, spread, low, named=named)
     solved = numbers.rms, numbers.size, numbers.samples
-    return Numbers(controller.with_numbers(values), estimates, notes, doubt, *solved, found)
+    return Numbers(controller.with_numbers(values), estimates, tuple(notes), doubt, *solved, found)
 
 
 def _remedy(controller: Controller, records: Sequence[Record]) -> str:
@@ -134,17 +140,11 @@ def _remedy(controller: Controller, records: Sequence[Record]) -> str:
     pi = cascade_of(controller).velocity
     given = [name for name in ("kp", "ki") if getattr(pi, name) is not None]
     none: dict[str, Any] = {"kp": None, "ki": None}
-    free = (
-        replace(controller, **none)
-        if isinstance(controller, PI)
-        else replace(cascade_of(controller), velocity=replace(pi, **none))
-    )
+    one = controller if isinstance(controller, PI) else cascade_of(controller)
+    free = replace(one, **none) if isinstance(one, PI) else replace(one, velocity=replace(pi, **none))
     if given and _follows(free, records):
         return f"It follows with another {' and '.join(given)}: give {' and '.join(f'{name}=None' for name in given)}"
-    return (
-        "The drive's has another form: give its filters, command_weight, feedforward and limits, with None ('unknown' in a drive "
-        "file) for numbers that you do not know, or leave the controller out and let the torque drive the model"
-    )
+    return number_words.OTHER_FORM
 
 
 def _follows(controller: Controller, records: Sequence[Record]) -> bool:
@@ -183,6 +183,7 @@ class _Solved:
 
     free: of a gain that stands at 0, what it would be without that bound where it is beyond its deviations; else 0.
     rms, size: of what is left, and of the torque where no limit acts [N m]. samples: how many independent ones are left.
+    twin: other values that the torque does not tell from these (`number_ranges.exchanged`); None where there are none.
     """
 
     x: Vector
@@ -195,6 +196,7 @@ class _Solved:
     size: float
     samples: float
     covariance: Matrix
+    twin: Vector | None = None
 
 
 class _Fit:
@@ -228,15 +230,25 @@ class _Fit:
         free = self.free(0.0)
         points = self._starts() if start is None else [start]
         grid = sorted((float(np.sum(free(x) ** 2)), tuple(x)) for x in (np.clip(x, low, high) for x in points))
-        rho = 0.0
-        off = self.free(rho)
+        off = self.free(0.0)
         enough = DEVIATION_ROUNDING * float(np.sum(self.logged[self.used] ** 2))
         tried: list[tuple[float, tuple[float, ...]]] = []
         for _, point in grid[: POLICY.best_points]:
             tried.append(self.searched(off, np.array(point), low, high, POLICY.usual))
             if min(tried)[0] <= enough:
                 break
-        best = np.array(min(tried)[1])
+        found = self._finished(np.array(min(tried)[1]), low, high)
+        other = exchanged(self.unknown, found.x, cascade_of(self.given))
+        if other is None:
+            return found
+        twin = self._finished(np.clip(other, low, high), low, high)
+        best, twin = (found, twin) if found.rms <= twin.rms else (twin, found)
+        told = gained(twin.rms**2, best.rms**2, min(best.samples, twin.samples)) > POLICY.rival_margin
+        apart = bool(np.any(np.abs(twin.values - best.values) > best.stds))
+        return best if told or not apart else replace(best, twin=twin.values)
+
+    def _finished(self, best: Vector, low: Vector, high: Vector) -> _Solved:
+        rho = 0.0
         for _ in range(POLICY.rounds):
             best = np.array(self.searched(self.free(rho), best, low, high, POLICY.final)[1])
             rho = correlation(self.left(best), self.stretch)

@@ -24,17 +24,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gaident.axis import Text, joined, say, unit_text
-from gaident.control.cascade import FEEDFORWARDS, Cascade, P, cascade_of
+from gaident.control.cascade import FEEDFORWARDS, Cascade, cascade_of
 from gaident.control.controller import Controller
 from gaident.control.found import FoundNumbers
 from gaident.control.pi import RULES
+from gaident.control.position import P
 from gaident.control.ticks import smooth_between
 from gaident.data.record import Record
 from gaident.data.signals.lattice import rounding_step
 from gaident.errors import GaidentError
 from gaident.identification.controller_numbers import with_estimates
 from gaident.identification.logged_stretches import Log, centred, correlation, log_of, whitened
-from gaident.identification.number_words import interpolated
+from gaident.identification.number_words import read_as
 from gaident.identification.replay.driven_records import follows_not, torque_driven
 from gaident.models.starts import noise_std, starts_moving
 from gaident.policy.table import POLICY
@@ -123,6 +124,13 @@ def off_by(rec: Record, log: Log, cascade: Cascade, made_of: Callable[[Log, bool
     )
 
 
+def _left(records: Sequence[Record], controller: Controller) -> float:
+    """Root mean square of logged minus made torque [N m]."""
+    cascade = cascade_of(controller)
+    logs = [log_of(r, len(r), cascade, whole=cascade.velocity.anti_windup == "none") for r in records]
+    return float(np.sqrt(np.mean(np.concatenate([log.torque - log.made(cascade) for log in logs]) ** 2)))
+
+
 def _as_before_a_limit(log: Log, error: Vector, cascade: Cascade, left: Vector, possible: float) -> bool:
     """Whether what is left (n,) [N m] behind each limit is what it was before, but for what the integral moves at its ends.
 
@@ -167,14 +175,15 @@ class Corrected(NamedTuple):
 
 
 def corrected(records: Sequence[Record], controller: Controller) -> Corrected | None:
-    """The other interpolation of its command, the rule of its integral, or the one number, with which all torques follow.
+    """The other way to read its command, the rule of its integral, or the one number, with which all torques follow.
 
     None where no change is enough, or several numbers are as good.
     A rule goes before a number: it has none, and on the lines a rectangular integral is a trapezoidal one with kp +- ki T/2.
     """
-    for other in controller.interpolations(records[0].dt)[1:]:
-        if not _doubts(records, other):
-            return Corrected(other, {}, say("With {} it does: all simulations use this.", interpolated(other)))
+    following = [other for other in controller.readings(records[0].dt)[1:] if not _doubts(records, other)]
+    if following:
+        closest = min(following, key=lambda other: _left(records, other))
+        return Corrected(closest, {}, say("With {} it does: all simulations use this.", read_as(closest, controller)))
     if (rule := _other_rule(records, cascade_of(controller))) is not None:
         return rule
     found = []
@@ -186,8 +195,8 @@ def corrected(records: Sequence[Record], controller: Controller) -> Corrected | 
         if numbers.controller is None or numbers.doubt or _doubts(records, numbers.controller):
             continue
         values = [_value(name, e) for name, e in numbers.estimates.items()]
-        moved = cascade_of(numbers.controller).interpolation != cascade_of(controller).interpolation
-        also = say(", and {},", interpolated(numbers.controller)) if moved else ""
+        moved = read_as(numbers.controller, controller)
+        also = say(", and {},", moved) if moved else ""
         text = "With {} (given: {}){} it does: all simulations use this."
         found.append(
             Corrected(numbers.controller, numbers.estimates, say(text, joined(" and ", values), given, also), numbers.found)

@@ -2,20 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import math
+from collections.abc import Callable, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
+from gaident.control.cascade import Cascade
 from gaident.policy.table import POLICY
 
-__all__ = ["FREQUENCIES", "SMALLEST", "TIME_CONSTANTS", "grid_of", "inverse", "off_bound", "range_of", "slopes"]
+__all__ = [
+    *("EXCHANGEABLE", "FREQUENCIES", "SMALLEST", "TIME_CONSTANTS"),
+    *("exchanged", "grid_of", "inverse", "off_bound", "range_of", "slopes"),
+]
 
 Vector = NDArray[np.float64]
 Matrix = NDArray[np.float64]
 
 SMALLEST = 1e-300  # no decision: no division by 0, and a controller of two gains of 0 is none
 TIME_CONSTANTS = np.geomspace(0.3, 100.0, POLICY.grid)  # no decision: a start; controller periods
+EXCHANGEABLE = ("position.gain", "velocity.ki")
 SLOPE_STEP = 1e-5  # no decision: the step of a difference, of a number
 FREQUENCIES = np.geomspace(2e-3, 0.4, POLICY.notches)  # no decision: a start; of the controller's sampling frequency
 
@@ -84,3 +90,21 @@ def slopes(off: Callable[[Vector], Vector], x: Vector, low: Vector) -> Matrix:
         columns.append((off(up) - off(down)) / (up[k] - down[k]))
     table: Matrix = np.array(columns).T
     return table
+
+
+def exchanged(unknown: Sequence[str], x: Vector, controller: Cascade) -> Vector | None:
+    """The numbers (as they are searched) with position gain and ki/kp in each other's place; None where these are not unknown.
+
+        u = kp (gain d + d') + ki integral(gain d + d') = kp (d/dt + gain)(d/dt + ki/kp) integral(d),   d = q* - q
+
+    With all of the command's slope fed forward only their sum and product show in the torque.
+    """
+    if not set(EXCHANGEABLE) <= set(unknown):
+        return None
+    gain, ki = (unknown.index(name) for name in EXCHANGEABLE)
+    kp = x[unknown.index("velocity.kp")] if "velocity.kp" in unknown else controller.velocity.kp
+    if not (x[ki] > 0.0 and kp > 0.0):
+        return None
+    other = x.copy()
+    other[gain], other[ki] = math.log(x[ki] / kp), kp * math.exp(x[gain])
+    return other

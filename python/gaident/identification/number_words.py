@@ -6,12 +6,23 @@ from collections.abc import Mapping, Sequence
 
 from gaident.arguments import TORQUE, arg
 from gaident.axis import Text, joined, say, unit_text
-from gaident.control.cascade import cascade_of
+from gaident.control.cascade import WAYS, cascade_of
 from gaident.control.controller import Controller
+from gaident.control.unknown import UNITS, field_of
 from gaident.data.record import Record
+from gaident.identification.number_ranges import EXCHANGEABLE
 from gaident.results.estimate import Estimate
 
-__all__ = ["found", "interpolated", "lacking", "moved", "negative", "not_followed", "not_shown", "other_interpolation"]
+__all__ = [
+    *("OTHER_FORM", "exchangeable", "found", "lacking", "moved", "negative"),
+    *("not_followed", "not_shown", "other_reading", "read_as"),
+]
+
+
+OTHER_FORM = (
+    "The drive's has another form: give its filters, command_weight, feedforward and limits, with None ('unknown' in a drive "
+    "file) for numbers that you do not know, or leave the controller out and let the torque drive the model"
+)
 
 
 def found(estimates: Mapping[str, Estimate], rms: float, size: float) -> Text:
@@ -26,15 +37,35 @@ def found(estimates: Mapping[str, Estimate], rms: float, size: float) -> Text:
     return say(text, joined(", ", numbers), rms, size)
 
 
-def interpolated(controller: Controller) -> str:
-    """How its position command is interpolated between the lines."""
-    way = cascade_of(controller).interpolation
-    return f"a position command that goes {way} between the lines of the log (interpolation {way!r})"
+def read_as(controller: Controller, given: Controller) -> str:
+    """How it reads its command, as far as that is not what was given; "" where it is."""
+    own, other = cascade_of(controller), cascade_of(given)
+    way, over = own.interpolation, own.feedforward_over
+    ways = []
+    if way != other.interpolation:
+        ways.append(f"a position command that goes {way} between the lines of the log (interpolation {way!r})")
+    if over != other.feedforward_over:
+        ways.append(f"a feedforward of the command's slope over the {over} period (feedforward_over {over!r})")
+    return " and ".join(ways)
 
 
-def other_interpolation(controller: Controller, given: Controller) -> Text:
-    text = "The {torque} follows clearly better with {} (given: {!r}): all simulations use this."
-    return say(text, interpolated(controller), cascade_of(given).interpolation)
+def other_reading(controller: Controller, given: Controller) -> Text:
+    text = "The {torque} follows clearly better with {} (given: {}): all simulations use this."
+    was = (getattr(cascade_of(given), name) for name in WAYS if getattr(cascade_of(given), name) != getattr(controller, name))
+    return say(text, read_as(controller, given), ", ".join(map(repr, was)))
+
+
+def exchangeable(twin: Mapping[str, float]) -> Text:
+    """twin: the other values of all unknown numbers."""
+    pair = {name: twin[name] for name in EXCHANGEABLE}
+    numbers = joined(
+        " and ", [say("{} = {:.4g} {}", name, value, unit_text(UNITS[field_of(name)])) for name, value in pair.items()]
+    )
+    text = (
+        "The {torque} does not tell these numbers from {}: where all of the command's slope is fed forward, position gain and "
+        "ki/kp can change places. Give the one that the drive shows."
+    )
+    return say(text, numbers)
 
 
 def moved(shift: int) -> Text:

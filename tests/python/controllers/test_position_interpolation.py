@@ -130,7 +130,7 @@ def test_the_way_of_a_command_is_a_setting() -> None:
     smooth = ga.Cascade(ga.PI(0.3, 15.0), T, position=ga.P(30.0), interpolation="smooth")
     assert ga.Cascade.from_dict(smooth.to_dict()) == smooth
     assert "interpolation" not in DRIVE.to_dict()
-    assert [c.interpolation for c in smooth.interpolations(1e-3)] == ["smooth", "straight"] and len(smooth.interpolations(T)) == 1
+    assert [c.interpolation for c in smooth.readings(1e-3)] == ["smooth", "straight"] and len(smooth.readings(T)) == 1
     rec = record({})
     assert line_equation([rec], DRIVE, None) and not line_equation([rec], smooth, None)
     with pytest.raises(ControllerError, match="interpolation is 'cubic'"):

@@ -7,7 +7,7 @@ import pytest
 
 import gaident as ga
 from drive_rig import Effects, Plant, run_drive
-from gaident.estimation.regression.reversal import jump_at_reversal, torque_held_at_rest
+from gaident.estimation.regression.reversal import jump_at_reversal, steep_drag, torque_held_at_rest
 from gaident.estimation.regression.sensor_lag import velocity_lag
 
 JOINT = Plant(J=15.0, D=18.0, kp=300.0, ki=1500.0, dt=1e-3)
@@ -102,3 +102,30 @@ def test_a_steep_drag_alone_is_no_dry_friction() -> None:
     (cause,) = ga.diagnose(joint(ROOT)).causes
     assert cause.effect == "square_root_drag" and not cause.alternatives
     assert cause.parameters["coefficient"].value == pytest.approx(20.0, rel=0.02)
+
+
+@pytest.mark.long
+def test_dry_friction_and_a_steep_drag_stand_beside_each_other() -> None:
+    """Bearings in grease: a level, and a drag that grows more slowly than the speed. Neither alone is the friction."""
+    dia = ga.diagnose(joint({**ROOT, "coulomb_friction": {"torque": 8.0}}))
+    found = {f.effect: {name: e.value for name, e in f.parameters.items()} for f in dia.causes}
+    assert found == {
+        "coulomb_friction": pytest.approx({"torque": 8.0}, rel=0.1),
+        "square_root_drag": pytest.approx({"coefficient": 20.0}, rel=0.05),
+    }
+    assert not any(f.alternatives for f in dia.causes) and dia.verdict == "explained"
+    assert dia.mechanics["viscous_friction"].value == pytest.approx(18.0, rel=0.1)
+
+
+@pytest.mark.parametrize(
+    ("effects", "steep"),
+    [
+        (ROOT, True),
+        ({**ROOT, "coulomb_friction": {"torque": 8.0}}, True),
+        ({"coulomb_friction": {"torque": 8.0}}, False),
+        ({}, False),
+    ],
+)
+def test_a_drag_steeper_than_viscous_friction_shows_beside_a_jump(effects: Effects, steep: bool) -> None:
+    found = steep_drag([joint(effects)])
+    assert found is not None and (found.value > 4.0 * found.std) is steep

@@ -274,6 +274,7 @@ CAUSES: tuple[Cause, ...] = (
         domains=AT_THE_SHAFT,
         curve=lambda w, p: -p["coefficient"] * np.sign(w) * np.sqrt(np.abs(w)),
         family=FRICTION,
+        steep=True,
         needs=(t.moves, t.several_speeds, t.both_directions),
         excited_by=("slow stairs", "triangle across zero", "speeds mixed in time"),
         alike={NO_REVERSAL: ("torque that grows",)},

@@ -39,13 +39,14 @@ from gaident.estimation.noise_model import WHITE
 from gaident.estimation.objective import Fit
 from gaident.estimation.prediction import torque_noise_in
 from gaident.estimation.regression.force_error import band_of
-from gaident.estimation.regression.reversal import jump_at_reversal, torque_held_at_rest
+from gaident.estimation.regression.reversal import jump_at_reversal, steep_drag, torque_held_at_rest
+from gaident.estimation.term import Term
 from gaident.models.model import Model
 from gaident.policy.table import POLICY
 from gaident.results.estimate import Estimate
 from gaident.results.inverse_dynamics import InverseDynamics
 
-__all__ = ["friction_shown", "only_describes", "share", "shown_by_the_records", "simplified", "what_is_left"]
+__all__ = ["only_describes", "share", "shown_by_the_records", "shown_without_model", "simplified", "what_is_left"]
 
 
 def what_is_left(space: Moves, final: Fit) -> tuple[bool, Dependence]:
@@ -89,14 +90,17 @@ def only_describes(
 
 
 def shown_by_the_records(space: Moves, final: Fit, effect: str) -> bool | None:
-    """Whether the records show dry friction of the finding's level by themselves; None where they say nothing.
+    """Whether the records show friction of the finding's size by themselves; None where they say nothing.
 
-    False where they show that there is none: the torque hardly jumps at the reversals.
+    False where they show that there is no dry friction: the torque hardly jumps at the reversals.
     Other effects are not tested: a function of the driver could show the same.
     """
     parameters = final.parameters
-    if not parameters.term(effect).levels or not space.data.torque_logged:
+    term = parameters.term(effect)
+    if not (term.levels or term.steep) or not space.data.torque_logged:
         return None
+    if term.steep:
+        return True if _steep_shown(space.data, parameters.model(final.x)) else None
     level = float(final.x[parameters.slot(effect)][0])
     jump, rest = _friction_in(space.data, parameters.model(final.x))
     if _sure(jump, rest, POLICY.of_its_level * level):
@@ -105,7 +109,24 @@ def shown_by_the_records(space: Moves, final: Fit, effect: str) -> bool | None:
     return False if refuted else None
 
 
-def friction_shown(data: DataSet, model: Model, axis: InverseDynamics | None = None) -> bool:
+def shown_without_model(
+    data: DataSet, model: Model, allowed: Sequence[Term], axis: InverseDynamics | None = None
+) -> frozenset[str]:
+    """Families and names of the effects that the records show without any simulation: dry friction, and a steep drag."""
+    shown = {t.family for t in allowed if t.levels} if _friction_shown(data, model, axis) else set()
+    if any(t.steep for t in allowed) and _steep_shown(data, model):
+        shown |= {t.name for t in allowed if t.steep}
+    return frozenset(shown)
+
+
+def _steep_shown(data: DataSet, model: Model) -> bool:
+    """Whether the torque rises more steeply from rest than dry and viscous friction do."""
+    if not data.torque_logged:
+        return False
+    return _sure(steep_drag(data.records, band_of(model, data.records, below=POLICY.rigid_band)), None, 0.0)
+
+
+def _friction_shown(data: DataSet, model: Model, axis: InverseDynamics | None) -> bool:
     """Whether the records show dry friction without any simulation: at the reversals, at rest, or by the regressed axis.
 
     Where no record turns back or rests, the part of the torque that does not depend on the speed counts as dry friction.

@@ -11,7 +11,7 @@ import numpy as np
 from gaident.diagnosis.library.equivalences import equivalents
 from gaident.diagnosis.library.sides import name_of
 from gaident.diagnosis.library.terms import LIBRARY, of_inverse_dynamics
-from gaident.diagnosis.selection.attribution import friction_shown
+from gaident.diagnosis.selection.attribution import shown_without_model
 from gaident.diagnosis.selection.mechanisms import is_mechanism, on_no_shaft, one_mass, reduced, resonant, rigid, swings
 from gaident.diagnosis.selection.model_space import Grown
 from gaident.diagnosis.selection.moves import MISSED, Moves
@@ -43,8 +43,8 @@ __all__ = ["ByOutputErrors", "Task", "linear_bases", "noise_floor", "output_erro
 class Task:
     """One selection on its grid of time.
 
-    most: effects in a model at most; shown: families of effects that the records show by themselves; rigid_below: the records
-    show one rigid body below it [rad/s], so that two masses with a slower resonance are no shaft.
+    most: effects in a model at most; shown: families and names of effects that the records show by themselves; rigid_below: the
+    records show one rigid body below it [rad/s], so that two masses with a slower resonance are no shaft.
     """
 
     objective: Objective
@@ -188,8 +188,7 @@ class ByOutputErrors:
         """
         task, family = self.task, self.objective.family
         assert isinstance(family, OutputErrors)
-        shows = friction_shown(task.data, task.model, self.axis)
-        shown = frozenset(t.family for t in task.allowed if t.levels) if shows else frozenset()
+        shown = shown_without_model(task.data, task.model, task.allowed, self.axis)
         return replace(task.under(replace(family, samples=samples)), shown=shown)
 
     def regressed(self, predictor: Predictor) -> Fit | None:

@@ -82,7 +82,7 @@ class ModelSpace(NoiseLevel):
 
     allowed: tuple[Term, ...]
     note: Callable[[str], None]
-    shown: frozenset[str] = frozenset()  # families of effects that the records show by themselves
+    shown: frozenset[str] = frozenset()  # families and names of effects that the records show by themselves
     rigid_below: float = 0.0  # rad/s, below which the records show one rigid body
     grown: Grown = field(default_factory=Grown)
 
@@ -117,9 +117,19 @@ class ModelSpace(NoiseLevel):
         """BIC and the penalties of the effects; the lower the better."""
         # The penalty is for candidates tried: what records show without a model, or a spring's tension at first, costs one less.
         made, spring = fit.parameters, fit.parameters.on_a_spring
-        effects = sum(_depth(t) - (t.family in self.shown or (spring and LIBRARY[t.name].constant)) for t in made.terms)
-        searched, more = sum(t.search_cost for t in made.terms), made.masses - 1 + spring  # a second mass or a spring is one, too
-        return fit.bic + self.penalty * (effects + more) + searched
+        friction = {t.family for t in made.terms} & self.shown
+        known = len(friction) + sum(spring and LIBRARY[t.name].constant for t in made.terms)
+        effects = sum(_depth(t) for t in made.terms) - known + made.masses - 1 + spring  # a second mass or a spring is one, too
+        return fit.bic + self.penalty * effects + sum(t.search_cost for t in made.terms) - self._shown_drags(fit)
+
+    def _shown_drags(self, fit: Fit) -> float:
+        """What drags beside dry friction cost less where the records show them [BIC units].
+
+        Such a drag costs what tells two explanations apart: the records show that there is one, not which.
+        """
+        beside = [t for t in fit.parameters.terms if t.steep and t.name in self.shown]
+        with_level = {t.family for t in fit.parameters.terms if t.levels}
+        return (self.penalty - self.margin) * sum(t.family in with_level for t in beside)
 
     def key(self, fit: Fit) -> Hashable:
         """The same for the same mechanism with the same effects, or with equivalent ones."""

@@ -76,13 +76,12 @@ class Moves(Repeated):
     def candidates(self, fit: Fit) -> list[Term]:
         """What may be added to a model."""
         there = fit.parameters.terms
-        families = {t.family for t in there if t.family}
         blocked = {name for t in there for name in t.excludes} | set(fit.effects)
         return [
             t
             for t in self.allowed
             if t.name not in blocked
-            and t.family not in families
+            and not t.excluded_in(there)
             and t.stands_with(fit.effects)
             and (fit.parameters.masses == 2 or not t.needs_two_masses)
             and (self.whitens or not t.in_controller or fit.predictor.closed)

@@ -1,4 +1,4 @@
-"""What shows dry friction without a simulation: the jump of the torque at a reversal, and a rest under a torque that changes.
+"""What shows friction without a simulation: the torque close to a reversal, and a rest under a torque that changes.
 
     u = J a + B w + C sign(w) + D cbrt(w) + T (+ gravity or a spring)
 
@@ -7,6 +7,7 @@ A regression without D finds a jump in every drag that rises steeply from zero, 
 and with many samples a very significant one.
 The column cbrt(w) rises more steeply than such a drag: with it C is what remains of the torque close to the reversal,
 or has a wide deviation where the motion shows too little of that.
+D beyond its deviation is a drag that rises more steeply from rest than viscous friction does, with or without a jump.
 What else the axis has, a friction that depends on load, angle or time, stays in the residuals, and in the deviations,
 which know that neighbouring residuals are alike.
 
@@ -30,7 +31,7 @@ from gaident.estimation.regression.rows import rows_of
 from gaident.estimation.regression.torque_terms import STEEP_DRAG, estimates_of
 from gaident.results.estimate import Estimate
 
-__all__ = ["jump_at_reversal", "torque_held_at_rest"]
+__all__ = ["jump_at_reversal", "steep_drag", "torque_held_at_rest"]
 
 
 DIRECTED = ("coulomb_by_direction", "offset")  # the same columns as dry friction and a constant
@@ -66,6 +67,22 @@ def jump_at_reversal(records: Sequence[Record], cutoff_hz: float | None = None) 
     0.1
     0.02
     """
+    found = _close_to_reversal(records, cutoff_hz)
+    return None if found is None else found["coulomb"]
+
+
+def steep_drag(records: Sequence[Record], cutoff_hz: float | None = None) -> Estimate | None:
+    """The drag that rises more steeply from rest than viscous friction, beside a jump: D [N m (s/rad)^(1/3)].
+
+    It is no physical number: a root of the speed shows in it as well as cbrt(w) does. Its deviation says whether there is one.
+    None, and the arguments: as of `jump_at_reversal`.
+    """
+    found = _close_to_reversal(records, cutoff_hz)
+    return None if found is None else found[STEEP_DRAG]
+
+
+def _close_to_reversal(records: Sequence[Record], cutoff_hz: float | None) -> dict[str, Estimate] | None:
+    """The terms of a regression with dry friction and a steep drag; None where these records cannot show them."""
     try:
         found = inverse_dynamics(list(records), cutoff_hz=cutoff_hz)
     except GaidentError:
@@ -81,8 +98,8 @@ def jump_at_reversal(records: Sequence[Record], cutoff_hz: float | None = None) 
     if rank < len(theta):
         return None
     left = [r.torque - r.columns @ theta for r in rows]
-    jump = estimates_of(terms, theta, covariance(X, left), found.axis)["coulomb"]
-    return replace(jump, identifiable=bool(jump.std < abs(jump.value)))
+    estimates = estimates_of(terms, theta, covariance(X, left), found.axis)
+    return {name: replace(e, identifiable=bool(e.std < abs(e.value))) for name, e in estimates.items()}
 
 
 def torque_held_at_rest(records: Sequence[Record], cutoff_hz: float | None = None) -> Estimate | None:
