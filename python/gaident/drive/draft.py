@@ -33,6 +33,7 @@ _CONSTANTS = {
 SPACE = "where to look, if you know; what is not given is derived from the data"
 NONE: Mapping[str, str | int] = {}
 LIMITS = "what an experiment may do, for `gaident experiment`"
+SHOW = "units of the summary and the page, beside SI"
 
 
 @dataclass(frozen=True)
@@ -155,7 +156,8 @@ class _Draft:
         time = ([], []) if self.prefix else (self.time(), self.unit_of_time())
         parts = [*self._section("columns", [*time[0], *self._columns()]), "", *self._section("units", [*self._units(), *time[1]])]
         parts += ["", *self._section("controller", self._controller()), "", *self._section("space", self._space(), SPACE)]
-        return [*parts, "", *self._section("limits", self._limits(), LIMITS)]
+        parts += ["", *self._section("limits", self._limits(), LIMITS)]
+        return [*parts, "", *self._section("show", self._shown(), SHOW)]
 
     def _section(self, name: str, lines: list[str], comment: str = "") -> list[str]:
         return [line_of(f"[{self.prefix}{name}]", comment), *lines]
@@ -317,16 +319,10 @@ class _Draft:
         text = "as set in the drive"
         if "torque" in self.guess.channels:
             text += ', "unknown", or loop = "open"'
-        alone = self._placed and not {"command", "torque"} & self.guess.channels.keys()
         positioned = "position_command" in self.guess.channels
         driven = positioned or "command" in self.guess.channels
         mark = self._todo if driven else lambda line, _, comment: line_of(line, comment)
         torque = word("torque", self.axis)
-        place = "# position_gain = 40.0"
-        if alone:  # without a torque the loop is all that drives the model
-            gain = self._todo(place, "controller.position_gain", "1/s; position command and position drive the loop")
-        else:
-            gain = line_of(place, "1/s; without it the velocity command drives the loop")
         return [
             mark("# kp = 0.0232", "controller.kp", f"{unit('N m s/rad', self.axis)}; proportional gain {text}"),
             mark(
@@ -337,11 +333,7 @@ class _Draft:
             line_of('# period = "125 us"', "of a controller that is faster than the log; also delay, torque_filters, ..."),
             line_of('# rule = "backward"', 'of the integral, or "forward"; left out: "trapezoidal"'),
             line_of("# torque_limit = 2.4", "a known limit of the controller, and integrator_limit"),
-            *(
-                [gain, line_of('# velocity_feedforward = "100 %"', "also acceleration_feedforward, position_period")]
-                if positioned
-                else []
-            ),
+            *(self._position_controller() if positioned else []),
             line_of('# loop = "sampled"', f'a digital drive; or "continuous"; or "open": the {torque} drives the model')
             if driven
             else line_of('loop = "open"', f"without a command the {torque} drives the model"),
@@ -349,11 +341,23 @@ class _Draft:
             line_of('# drive = "sinamics"', "with p1460 and p1462 in place of kp and ki: gains as the drive shows them"),
         ]
 
+    def _position_controller(self) -> list[str]:
+        place = "# position_gain = 40.0"
+        if "command" in self.guess.channels:
+            gain = line_of(place, "1/s; without it the velocity command drives the loop")
+        else:
+            gain = self._todo(place, "controller.position_gain", "1/s; position command and position drive the loop")
+        return [gain, line_of('# velocity_feedforward = "100 %"', "also acceleration_feedforward, feedforward_over, ...")]
+
     def _space(self) -> list[str]:
         return [
             line_of("# inertia = [1e-4, 5e-3]", said(Text("total inertia at the motor, kg m^2", "total mass, kg"), self.axis)),
             line_of("# resonance_hz = [5, 200]", "where the mechanism may resonate"),
         ]
+
+    def _shown(self) -> list[str]:
+        units = {name: self.units.get(name) for name in ("velocity", "torque", "position") if name in self.guess.channels}
+        return [line_of(f"# {name} = {quoted(stated)}", "as the log says") for name, stated in units.items() if stated]
 
     def _limits(self) -> list[str]:
         lines = []

@@ -151,7 +151,7 @@ class Drive:
         if self.columns.get("command") != "" and "drive" not in values:
             remedy = 'or give --kp and --ki ("unknown" where a torque is logged), or --loop open to work from torque to velocity'
             integral = () if any(key in values for key in INTEGRAL_TIMES) else ("ki",)
-            self._refuse_unfilled("controller", ("kp", *integral), remedy)
+            self._refuse_unfilled("controller", ("kp", *integral, "position_gain"), remedy)
         return controller_of(values, self.general) if values else None
 
     def proportional_gain(self) -> float | None:

@@ -150,6 +150,20 @@ def test_gains_of_a_drive_fill_the_marks_of_init(here: Path) -> None:
         controller_in(f"[controller]\n{marked}")
 
 
+def test_a_log_without_a_velocity_command_asks_for_the_position_gain(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Nothing else drives the velocity loop; beside a velocity command the gain may be left out."""
+    with pytest.raises(ga.GaidentError, match=r"position_gain of \[controller\], marked FILL IN"):
+        controller_in("[controller]\nkp = 0.02\nki = 2\n# position_gain = 40.0  # FILL IN: 1/s\n")
+    t = 1e-3 * np.arange(400)
+    columns = {"t [s]": t, "v_act [rad/s]": np.sin(t), "pos_act [rad]": 1 - np.cos(t), "pos_cmd [rad]": 1 - np.cos(t)}
+    for names, marks in ((tuple(columns), 1), ((*columns, "v_cmd [rad/s]"), 0)):
+        values = np.column_stack([{**columns, "v_cmd [rad/s]": np.sin(t)}[name] for name in names])
+        np.savetxt("axis.csv", values, delimiter=",", header=",".join(names), comments="")
+        assert main(["init", "axis.csv", "--out", f"{marks}.toml"]) == 0
+        assert capsys.readouterr().out.count("controller.position_gain: 1/s") == marks
+        assert "feedforward_over" in Path(f"{marks}.toml").read_text() and "[show]" in Path(f"{marks}.toml").read_text()
+
+
 def test_a_cascade_reaches_identify_diagnose_and_simulate(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """A backward PI with a torque filter, its gains as the drive shows them, a log of all its samples."""
     dt, samples = 1e-3, 1200
