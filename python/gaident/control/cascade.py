@@ -210,7 +210,7 @@ class Cascade(Controller):
     def readings(self, dt: float) -> tuple[Cascade, ...]:
         """See `Controller`: each interpolation of a position command, with each slope of it that is fed forward."""
         between = INTERPOLATIONS if self.position is not None and self.log_every(dt) > 1 else (self.interpolation,)
-        over = (self.feedforward_over,) if self.velocity_feedforward == self.acceleration_feedforward == 0.0 else SLOPES
+        over = SLOPES if any(getattr(self, name) != 0.0 for name in FEEDFORWARDS) else (self.feedforward_over,)
         ways = [(i, o) for o in over for i in between if (i, o) != (self.interpolation, self.feedforward_over)]
         return self, *(replace(self, interpolation=i, feedforward_over=o) for i, o in ways)
 
@@ -225,7 +225,7 @@ class Cascade(Controller):
         source, every = self.command_of(log), self.log_every(log.dt)
         if every == 1 or source is None or self.limited or self.friction_feedforward != 0.0:
             return False
-        if self.feedforward_over != "coming" and not self.velocity_feedforward == self.acceleration_feedforward == 0.0:
+        if self.feedforward_over != "coming" and any(getattr(self, name) != 0.0 for name in FEEDFORWARDS):
             return False  # the equation has the command's slope over the coming period
         if self.acceleration_feedforward != 0.0 and self.source_of(log) is not source:
             return False  # of what the command did between the lines the equation takes the mean alone

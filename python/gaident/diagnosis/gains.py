@@ -31,7 +31,7 @@ from gaident.models import simulate
 from gaident.models.made_torque import load_before, stored_torque
 from gaident.models.model import Model
 from gaident.models.simulate import initial_state
-from gaident.models.starts import noise_std, starts_moving, torque_before
+from gaident.models.starts import noise_std, rounding_noise, starts_moving, torque_before
 from gaident.policy.table import POLICY
 from gaident.results.fitness import IN_SAMPLE, Fitness
 
@@ -144,8 +144,8 @@ def measured_gains(
     floor = float(np.mean([noise_std(r.velocity, step) for r, _ in scored])) if noise is None else noise
     if noise is None and objective.data.slower:  # where the motion itself has third differences, the model has them too
         floor = min(floor, float(np.mean([noise_std(e, step) for e in errors[-1]])))
-    rounding = step / float(np.sqrt(12.0))
-    floor = max(floor, rounding)
+    old = objective.data.age > 0.0
+    floor = max(floor, float(np.mean([rounding_noise(r.velocity, step, old) for r, _ in scored])))
     size = float(np.sqrt(np.mean((spread - spread.mean()) ** 2)))
 
     def fitness(parts: list[Vector]) -> Fitness:

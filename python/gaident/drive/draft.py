@@ -156,8 +156,8 @@ class _Draft:
         time = ([], []) if self.prefix else (self.time(), self.unit_of_time())
         parts = [*self._section("columns", [*time[0], *self._columns()]), "", *self._section("units", [*self._units(), *time[1]])]
         parts += ["", *self._section("controller", self._controller()), "", *self._section("space", self._space(), SPACE)]
-        parts += ["", *self._section("limits", self._limits(), LIMITS)]
-        return [*parts, "", *self._section("show", self._shown(), SHOW)]
+        parts += ["", *self._section("show", self._shown(), SHOW)]
+        return [*parts, "", *self._section("limits", self._limits(), LIMITS)]
 
     def _section(self, name: str, lines: list[str], comment: str = "") -> list[str]:
         return [line_of(f"[{self.prefix}{name}]", comment), *lines]

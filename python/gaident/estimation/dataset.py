@@ -30,7 +30,7 @@ from gaident.models.drive_torque import as_late, torque_of
 from gaident.models.made_torque import load_before, stored_torque
 from gaident.models.simulate_many import LoadedRecord
 from gaident.models.simulation_input import followed
-from gaident.models.starts import noise_std, starts_moving, torque_before
+from gaident.models.starts import noise_std, rounding_noise, starts_moving, torque_before
 from gaident.policy.table import POLICY
 
 __all__ = ["DataSet"]
@@ -334,19 +334,19 @@ class DataSet:
     @cached_property
     def noise(self) -> float:
         """Standard deviation of white noise on the velocity, as its third differences show it [rad/s]."""
-        if self.known_noise is not None:
-            return self.known_noise
-        return float(np.mean([noise_std(r.velocity, self.resolution) for r in self.records]))
+        seen = np.mean([noise_std(r.velocity) for r in self.records])
+        return max(float(seen), self.rounding) if self.known_noise is None else self.known_noise
+
+    @cached_property
+    def rounding(self) -> float:  # what the lattice of the velocities makes of their noise [rad/s]
+        return float(np.mean([rounding_noise(r.velocity, self.resolution, self.age > 0.0) for r in self.records]))
 
     def noise_of(self, error: Vector) -> float:
-        """The same as the errors of a model show it, records one after the other [rad/s].
-
-        Of a log that is slower than its controller, whose motion itself has third differences; else it is `noise`.
-        """
+        """The same as a model's errors show it, where the motion has third differences: of a log slower than its controller."""
         if not self.slower or self.known_noise is not None or not np.all(np.isfinite(error)):
             return self.noise
-        parts = np.split(error, np.cumsum(self.lengths)[:-1])
-        return min(self.noise, float(np.mean([noise_std(e, self.resolution) for e in parts])))
+        seen = float(np.mean([noise_std(e) for e in np.split(error, np.cumsum(self.lengths)[:-1])]))
+        return min(self.noise, max(seen, self.rounding))
 
     def replayed(self, effects: Mapping[Term, Vector]) -> tuple[Record, ...]:
         """The records as driven by the torque that the controller makes with effects of its own, each with its parameters."""

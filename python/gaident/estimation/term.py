@@ -6,7 +6,7 @@ What it has to know of one is data of its `Term`; the terms themselves stand in 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 
@@ -92,6 +92,7 @@ class Term:
     domains: frozenset[str] = frozenset()  # signals whose free function imitates it
     levels: bool = False  # its first coordinate is the level of dry friction
     steep: bool = False  # a drag that rises more steeply from rest than in proportion to the velocity
+    bends: bool = False  # its torque does so, or falls from rest and rises again: it bends over the velocity
     time_varying: bool = False  # its size changes in the course of a record: a mean over the record is none of its parameters
     at_peaks: bool = False  # it acts at the largest torques only
     smooth: bool = True  # what it makes of a small change is small; a function of the user's may round, or jump at a threshold
@@ -109,12 +110,15 @@ class Term:
         """Whether a model with these effects contains what its torque depends on."""
         return not self.beside or not self.beside.isdisjoint(effects)
 
-    def excluded_in(self, there: Iterable[Term]) -> bool:
-        """Whether a model with these effects contains another of its family that says the same.
+    def excluded_in(self, there: Iterable[Term], shown: Collection[str] = ()) -> bool:
+        """Whether a model with these effects contains another of its family that takes its place.
 
-        A drag has no level, and dry friction no course over the velocity: the friction of an axis may be both.
+        shown: effects that the records show without a model.
+        Such a drag stands beside dry friction: one has no level, the other no course over the velocity.
+        Else what a friction lacks near rest would pass for a drag.
         """
-        return any(self.family and t.family == self.family and not (self.steep ^ t.steep) for t in there)
+        others = [t for t in there if self.family and t.family == self.family]
+        return any(not (t.steep ^ self.steep and {t.name, self.name} & {*shown}) for t in others)
 
     @cached_property
     def size(self) -> int:

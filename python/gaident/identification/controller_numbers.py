@@ -33,7 +33,7 @@ from gaident.errors import ControllerError, RecordError
 from gaident.estimation.criterion import effective_samples, gained
 from gaident.identification import number_words
 from gaident.identification.logged_stretches import centred, correlation, log_of, numbered, unlimited, whitened
-from gaident.identification.number_ranges import SMALLEST, exchanged, grid_of, inverse, off_bound, range_of, slopes
+from gaident.identification.number_ranges import EXCHANGEABLE, SMALLEST, exchanged, grid_of, inverse, off_bound, range_of, slopes
 from gaident.policy.table import POLICY
 from gaident.results.estimate import Estimate
 
@@ -84,11 +84,12 @@ def with_estimates(records: Sequence[Record], controller: Controller | None) -> 
     for rec in records:
         if why := number_words.lacking(rec, controller):
             raise RecordError(why)
-    given, *others = [_estimated(records, one) for one in controller.readings(records[0].dt)]
+    if not (given := _estimated(records, controller)).doubt and given.rms <= POLICY.negligible * given.size:
+        return given
+    others = [_estimated(records, one) for one in controller.readings(records[0].dt)[1:]]
     best = min((n for n in others if not n.doubt), key=lambda n: n.rms, default=given)
     gain = gained(given.rms**2, best.rms**2, min(given.samples, best.samples))
-    as_good = given.rms <= POLICY.negligible * given.size or gain <= POLICY.rival_margin
-    if best is given or best.controller is None or (not given.doubt and as_good):
+    if best is given or best.controller is None or (not given.doubt and gain <= POLICY.rival_margin):
         return given
     return replace(best, notes=(*best.notes, number_words.other_reading(best.controller, controller)))
 
@@ -100,7 +101,7 @@ def _estimated(records: Sequence[Record], controller: Controller) -> Numbers:
     numbers, shift = _shifted(controller, unknown, records, _solved(controller, unknown, records))
     values = {name: float(x) for name, x in zip(unknown, numbers.values, strict=True)}
     twin = numbers.twin
-    apart = np.zeros(len(unknown)) if twin is None else twin - numbers.values
+    apart = np.zeros(len(unknown)) if twin is None else np.where(np.isin(unknown, EXCHANGEABLE), twin - numbers.values, 0.0)
     stds = np.hypot(numbers.stds, apart).tolist()
     estimates = {
         name: Estimate(value, std, UNITS[field_of(name)], at_bound, std < abs(value))
@@ -115,7 +116,7 @@ def _estimated(records: Sequence[Record], controller: Controller) -> Numbers:
     elif hidden:
         doubt = number_words.not_shown(hidden[0], estimates[hidden[0]])
     notes = [number_words.found(estimates, numbers.rms, numbers.size)]
-    notes += [number_words.exchangeable(dict(zip(unknown, twin.tolist(), strict=True)))] if twin is not None else []
+    notes += [] if twin is None else [number_words.exchangeable(dict(zip(unknown, twin.tolist(), strict=True)))]
     notes += [number_words.moved(shift)] if shift else []
 
     def made(x: Vector) -> Controller:
@@ -238,14 +239,14 @@ class _Fit:
             if min(tried)[0] <= enough:
                 break
         found = self._finished(np.array(min(tried)[1]), low, high)
-        other = exchanged(self.unknown, found.x, cascade_of(self.given))
-        if other is None:
+        if not all(found.seen) or (other := exchanged(self.unknown, found.x, cascade_of(self.given))) is None:
             return found
         twin = self._finished(np.clip(other, low, high), low, high)
         best, twin = (found, twin) if found.rms <= twin.rms else (twin, found)
         told = gained(twin.rms**2, best.rms**2, min(best.samples, twin.samples)) > POLICY.rival_margin
-        apart = bool(np.any(np.abs(twin.values - best.values) > best.stds))
-        return best if told or not apart else replace(best, twin=twin.values)
+        pair = [self.unknown.index(name) for name in EXCHANGEABLE]
+        apart = bool(np.any(np.abs(twin.values - best.values)[pair] > np.array(best.stds)[pair]))
+        return best if told or not apart or any(twin.at_bound) else replace(best, twin=twin.values)
 
     def _finished(self, best: Vector, low: Vector, high: Vector) -> _Solved:
         rho = 0.0

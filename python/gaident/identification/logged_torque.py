@@ -194,6 +194,9 @@ def corrected(records: Sequence[Record], controller: Controller) -> Corrected | 
             continue
         if numbers.controller is None or numbers.doubt or _doubts(records, numbers.controller):
             continue
+        of = cascade_of(controller)
+        if all(abs(e.value - _given(of, n)) <= POLICY.check_deviations * e.std for n, e in numbers.estimates.items()):
+            continue  # none of them is another number than the given one
         values = [_value(name, e) for name, e in numbers.estimates.items()]
         moved = read_as(numbers.controller, controller)
         also = say(", and {},", moved) if moved else ""
@@ -212,6 +215,12 @@ def _other_rule(records: Sequence[Record], cascade: Cascade) -> Corrected | None
         return None
     name, one = found[0]
     return Corrected(one, {}, say("With the rule {} of its integral it does: all simulations use this.", repr(name)))
+
+
+def _given(cascade: Cascade, name: str) -> float:
+    """A number of the controller by its name, see `Controller.unknown`."""
+    named = ((part, name.removeprefix(before)) for before, part in cascade.parts if name.startswith(before))
+    return next(float(getattr(part, field)) for part, field in named if hasattr(part, field))
 
 
 def _value(name: str, e: Estimate) -> Text:

@@ -11,7 +11,10 @@ from gaident.data.record import Record
 from gaident.data.signals.lattice import changes
 from gaident.policy.table import POLICY
 
-__all__ = ["constant_beside", "doubtful_start", "noise_std", "starts_moving", "stretches", "torque_before"]
+__all__ = ["constant_beside", "doubtful_start", "noise_std", "rounding_noise", "starts_moving", "stretches", "torque_before"]
+
+
+AT_ONCE = 4  # no decision: a formula: samples that a third difference takes, which shows no noise where they are equal
 
 
 def noise_std(velocity: NDArray[np.float64], step: float = 0.0) -> float:
@@ -27,6 +30,21 @@ def noise_std(velocity: NDArray[np.float64], step: float = 0.0) -> float:
     least = step / np.sqrt(12.0)
     # no decision: a formula: third differences of white noise and their median
     return float(max(1.4826 * np.median(np.abs(thirds)) / np.sqrt(20.0), least)) if len(thirds) else float(least)
+
+
+def rounding_noise(velocity: NDArray[np.float64], step: float, differenced: bool) -> float:
+    """Standard deviation of the noise that rounding makes of a velocity on a lattice of this step [rad/s].
+
+    A rounded velocity: step/sqrt(12). The difference of two rounded angles: step/sqrt(6) while the axis moves, nothing at rest.
+    With the part p of a step by which the true difference exceeds a whole number of them, its error has the variance p (1 - p) of
+    a step squared, 1/6 in the mean of all speeds (B. Widrow, I. Kollar, Quantization Noise, Cambridge University Press, 2008).
+    Third differences show less of a coarse one: their median is that of whole steps.
+    """
+    if not differenced:
+        return step / float(np.sqrt(12.0))
+    still = np.convolve(velocity == 0.0, np.ones(AT_ONCE), "valid") == AT_ONCE  # no count in so many samples
+    resting = np.convolve(still, np.ones(AT_ONCE)) > 0.0
+    return step * float(np.sqrt(1.0 - np.mean(resting))) / float(np.sqrt(6.0))
 
 
 def _outside_runs(x: NDArray[np.float64]) -> NDArray[np.bool_]:

@@ -194,6 +194,12 @@ class Decisions:
     of_its_level: float = cause(
         0.5, "1", "part of a friction's level that the jump at reversals, or the torque held at rest, has at least", REAL
     )
+    steep_above: float = cause(
+        0.3,
+        "1",
+        "of the largest speed, above which a drag is as steep as of all speeds; friction that dips near rest is not",
+        REAL,
+    )
 
     # Does a second method agree? The inverse-dynamics regression beside the result.
     check_deviations: float = check(

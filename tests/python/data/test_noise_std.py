@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from gaident.models.starts import noise_std
+from gaident.models.starts import noise_std, rounding_noise
 
 N = 20_000
 TIME = 1e-3 * np.arange(N)
@@ -60,3 +60,18 @@ def test_what_never_moves_or_only_jumps_shows_no_noise() -> None:
     jumps = np.repeat([0.0, 3.0, -2.0, 5.0], 50)
     assert noise_std(np.zeros(50)) == noise_std(jumps) == 0.0
     assert noise_std(jumps, 1.0) == pytest.approx(1.0 / np.sqrt(12.0))
+
+
+@pytest.mark.parametrize("speed", [3.0, 40.0])
+def test_the_difference_of_two_rounded_angles_has_the_noise_of_two_roundings(speed: float) -> None:
+    """Of a coarse encoder the median of the third differences is that of whole steps, and less."""
+    dt, step = 125e-6, 2.0 * np.pi / 2**19
+    t = dt * np.arange(8 * 4000)
+    angle = -speed / 5.0 * np.cos(5.0 * np.minimum(t, 2.0))  # at rest in the end
+    true = np.diff(angle, prepend=angle[0]) / dt
+    seen = np.diff(np.floor(angle / step), prepend=np.floor(angle[0] / step)) * step / dt
+    w, error = seen[::8], (seen - true)[::8]
+    noise = rounding_noise(w, step / dt, differenced=True)
+    assert noise == pytest.approx(np.sqrt(np.mean(error**2)), rel=0.05)
+    assert rounding_noise(w, step / dt, differenced=False) == pytest.approx(step / dt / np.sqrt(12.0))
+    assert rounding_noise(np.zeros(10), step / dt, differenced=True) == 0.0

@@ -46,7 +46,10 @@ from gaident.policy.table import POLICY
 from gaident.results.estimate import Estimate
 from gaident.results.inverse_dynamics import InverseDynamics
 
-__all__ = ["only_describes", "share", "shown_by_the_records", "shown_without_model", "simplified", "what_is_left"]
+__all__ = [
+    *("friction_shown", "only_describes", "share", "shown_by_the_records"),
+    *("shown_without_model", "simplified", "what_is_left"),
+]
 
 
 def what_is_left(space: Moves, final: Fit) -> tuple[bool, Dependence]:
@@ -113,20 +116,22 @@ def shown_without_model(
     data: DataSet, model: Model, allowed: Sequence[Term], axis: InverseDynamics | None = None
 ) -> frozenset[str]:
     """Families and names of the effects that the records show without any simulation: dry friction, and a steep drag."""
-    shown = {t.family for t in allowed if t.levels} if _friction_shown(data, model, axis) else set()
-    if any(t.steep for t in allowed) and _steep_shown(data, model):
-        shown |= {t.name for t in allowed if t.steep}
+    shown = {t.family for t in allowed if t.levels} if friction_shown(data, model, axis) else set()
+    if any(t.bends for t in allowed) and _steep_shown(data, model):
+        shown |= {t.name for t in allowed if t.bends}
     return frozenset(shown)
 
 
 def _steep_shown(data: DataSet, model: Model) -> bool:
-    """Whether the torque rises more steeply from rest than dry and viscous friction do."""
+    """Whether the torque rises more steeply from rest than dry and viscous friction do, and bends so at high speeds, too."""
     if not data.torque_logged:
         return False
-    return _sure(steep_drag(data.records, band_of(model, data.records, below=POLICY.rigid_band)), None, 0.0)
+    cutoff = band_of(model, data.records, below=POLICY.rigid_band)
+    whole, fast = steep_drag(data.records, cutoff), steep_drag(data.records, cutoff, POLICY.steep_above)
+    return whole is not None and _sure(whole, None, 0.0) and _sure(fast, None, POLICY.of_its_level * whole.value)
 
 
-def _friction_shown(data: DataSet, model: Model, axis: InverseDynamics | None) -> bool:
+def friction_shown(data: DataSet, model: Model, axis: InverseDynamics | None = None) -> bool:
     """Whether the records show dry friction without any simulation: at the reversals, at rest, or by the regressed axis.
 
     Where no record turns back or rests, the part of the torque that does not depend on the speed counts as dry friction.

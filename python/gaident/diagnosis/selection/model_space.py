@@ -120,16 +120,17 @@ class ModelSpace(NoiseLevel):
         friction = {t.family for t in made.terms} & self.shown
         known = len(friction) + sum(spring and LIBRARY[t.name].constant for t in made.terms)
         effects = sum(_depth(t) for t in made.terms) - known + made.masses - 1 + spring  # a second mass or a spring is one, too
-        return fit.bic + self.penalty * effects + sum(t.search_cost for t in made.terms) - self._shown_drags(fit)
+        return fit.bic + self.penalty * effects + sum(t.search_cost for t in made.terms) - self._shown_bends(fit)
 
-    def _shown_drags(self, fit: Fit) -> float:
-        """What drags beside dry friction cost less where the records show them [BIC units].
+    def _shown_bends(self, fit: Fit) -> float:
+        """What friction that bends over the velocity costs less where the records show that it does [BIC units].
 
-        Such a drag costs what tells two explanations apart: the records show that there is one, not which.
+        A drag beside dry friction, or a friction that falls from rest, costs what tells two explanations apart: the records show
+        that there is one, not which.
         """
-        beside = [t for t in fit.parameters.terms if t.steep and t.name in self.shown]
+        bent = [t for t in fit.parameters.terms if t.bends and t.name in self.shown]
         with_level = {t.family for t in fit.parameters.terms if t.levels}
-        return (self.penalty - self.margin) * sum(t.family in with_level for t in beside)
+        return (self.penalty - self.margin) * sum(t.family in with_level for t in bent)
 
     def key(self, fit: Fit) -> Hashable:
         """The same for the same mechanism with the same effects, or with equivalent ones."""

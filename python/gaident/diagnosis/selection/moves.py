@@ -81,7 +81,7 @@ class Moves(Repeated):
             t
             for t in self.allowed
             if t.name not in blocked
-            and not t.excluded_in(there)
+            and not t.excluded_in(there, self.shown)
             and t.stands_with(fit.effects)
             and (fit.parameters.masses == 2 or not t.needs_two_masses)
             and (self.whitens or not t.in_controller or fit.predictor.closed)

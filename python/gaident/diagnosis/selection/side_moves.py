@@ -112,7 +112,7 @@ class SideMoves(ModelSpace):
         if not key or hypothesis.parameters.masses == 1 or any(t.name == key or t.resonates for t in there):
             return None
         other = LIBRARY[key]
-        if other.excluded_in(there) or not self.may(other):
+        if other.excluded_in(there, self.shown) or not self.may(other):
             return None
         effects = (*hypothesis.effects, key)
         return other if all(t.stands_with(effects) for t in (*there, other)) else None

@@ -7,7 +7,8 @@ A regression without D finds a jump in every drag that rises steeply from zero, 
 and with many samples a very significant one.
 The column cbrt(w) rises more steeply than such a drag: with it C is what remains of the torque close to the reversal,
 or has a wide deviation where the motion shows too little of that.
-D beyond its deviation is a drag that rises more steeply from rest than viscous friction does, with or without a jump.
+D beyond its deviation is a drag that rises more steeply from rest than viscous friction does, with or without a jump:
+where it is as large at the higher speeds alone. A friction that is smaller close to rest has a D of all speeds, and none there.
 What else the axis has, a friction that depends on load, angle or time, stays in the residuals, and in the deviations,
 which know that neighbouring residuals are alike.
 
@@ -71,17 +72,17 @@ def jump_at_reversal(records: Sequence[Record], cutoff_hz: float | None = None) 
     return None if found is None else found["coulomb"]
 
 
-def steep_drag(records: Sequence[Record], cutoff_hz: float | None = None) -> Estimate | None:
+def steep_drag(records: Sequence[Record], cutoff_hz: float | None = None, above: float = 0.0) -> Estimate | None:
     """The drag that rises more steeply from rest than viscous friction, beside a jump: D [N m (s/rad)^(1/3)].
 
     It is no physical number: a root of the speed shows in it as well as cbrt(w) does. Its deviation says whether there is one.
-    None, and the arguments: as of `jump_at_reversal`.
+    above: share of the largest speed, below which no row counts. None, and the other arguments: as of `jump_at_reversal`.
     """
-    found = _close_to_reversal(records, cutoff_hz)
+    found = _close_to_reversal(records, cutoff_hz, above)
     return None if found is None else found[STEEP_DRAG]
 
 
-def _close_to_reversal(records: Sequence[Record], cutoff_hz: float | None) -> dict[str, Estimate] | None:
+def _close_to_reversal(records: Sequence[Record], cutoff_hz: float | None, above: float = 0.0) -> dict[str, Estimate] | None:
     """The terms of a regression with dry friction and a steep drag; None where these records cannot show them."""
     try:
         found = inverse_dynamics(list(records), cutoff_hz=cutoff_hz)
@@ -93,11 +94,14 @@ def _close_to_reversal(records: Sequence[Record], cutoff_hz: float | None) -> di
     viscous = () if any(t.startswith("viscous") for t in kept) else ("viscous",)
     terms = (*kept, *viscous, "coulomb", "offset", STEEP_DRAG)
     rows = [rows_of(r, terms, found.cutoff_hz, found.order, found.decimation, None) for r in records]
-    X = [r.columns for r in rows]
-    theta, rank = solve(np.vstack(X), np.concatenate([r.torque for r in rows]))
+    speeds = [np.abs(r.of((STEEP_DRAG,))[:, 0]) ** 3 for r in rows]
+    least = above * max((float(w.max()) for w in speeds if len(w)), default=0.0)
+    X = [r.columns[w >= least] for r, w in zip(rows, speeds, strict=True)]
+    torque = [r.torque[w >= least] for r, w in zip(rows, speeds, strict=True)]
+    theta, rank = solve(np.vstack(X), np.concatenate(torque))
     if rank < len(theta):
         return None
-    left = [r.torque - r.columns @ theta for r in rows]
+    left = [u - x @ theta for u, x in zip(torque, X, strict=True)]
     estimates = estimates_of(terms, theta, covariance(X, left), found.axis)
     return {name: replace(e, identifiable=bool(e.std < abs(e.value))) for name, e in estimates.items()}
 
