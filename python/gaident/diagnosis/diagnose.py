@@ -184,7 +184,7 @@ def diagnose(
                     continue
                 note(0.03, "once more, with another rule of the integral")
                 ruled = searched(work.driving.ruled(rule), most)
-                if ruled.confirms(work):
+                if ruled.confirms(work) or _explains_more(ruled, work):
                     work = ruled
                     break
             given_work = work
@@ -236,3 +236,10 @@ def diagnose(
             space = work.found.space
             result = with_p_value(result, space, work.base, work.final, bootstrap, seed, lambda message: note(None, message))
     return replace(result, seconds=time.perf_counter() - began)
+
+
+def _explains_more(one: Work, given: Work) -> bool:
+    """Whether a search under another controller of as many numbers leaves noise, with no more effects, and is clearly better."""
+    score, least = (work.found.space.score(work.final) for work in (one, given))
+    no_more = len(one.final.effects) <= len(given.final.effects)
+    return no_more and leaves_noise(one.found.space, one.final) and score < least - one.found.space.margin
