@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from dataclasses import replace
 
 import numpy as np
@@ -14,6 +15,7 @@ from gaident.errors import ControllerError
 from gaident.identification.controller_numbers import with_estimates
 from gaident.identification.logged_torque import corrected, not_followed
 from gaident.identification.replay.driven_records import torque_driven
+from gaident.results.store import schema
 
 T = 250e-6
 INERTIA, VISCOUS, KP, KI, KV = 1.5e-3, 2e-3, 0.3, 15.0, 30.0
@@ -81,6 +83,9 @@ def test_a_diagnosis_takes_it_for_no_effect() -> None:
     dia = ga.diagnose(log(1), GIVEN)
     assert dia.verdict == "adequate" and not dia.findings, dia.summary()
     assert dia.controller == PAST and any("feedforward_over" in note for note in dia.notes)
+    jsonschema = pytest.importorskip("jsonschema", reason="jsonschema is not installed: pip install '.[test]'")
+    jsonschema.Draft202012Validator(schema()).validate(json.loads(dia.to_json()))
+    assert ga.Diagnosis.from_dict(json.loads(dia.to_json())).controller == PAST
     assert dia.mechanics["inertia"].value == pytest.approx(INERTIA, rel=1e-3)
 
 
