@@ -22,7 +22,7 @@ from gaident.control.unknown import known, with_own
 from gaident.control.words import UNKNOWN
 from gaident.errors import ControllerError
 
-__all__ = ["Cascade", "Filter", "P", "cascade_of", "controller_of"]
+__all__ = ["Cascade", "Filter", "cascade_of", "controller_of"]
 
 Vector = NDArray[np.float64]
 

@@ -188,11 +188,14 @@ class Decisions:
     jump_deviations: float = cause(
         4.0,
         "1",
-        "standard deviations of the torque's jump at reversals, from which it is dry friction; 237 records without: 3.4",
+        "standard deviations of the torque's jump at reversals, or a steep drag, from which it counts; 237 records without: 3.4",
         REAL,
     )
     of_its_level: float = cause(
-        0.5, "1", "part of a friction's level that the jump at reversals, or the torque held at rest, has at least", REAL
+        0.5,
+        "1",
+        "part of a friction's level that jump or held torque has at least, and of a steep drag fast motion has",
+        REAL,
     )
     steep_above: float = cause(
         0.3,

@@ -115,7 +115,7 @@ def shown_by_the_records(space: Moves, final: Fit, effect: str) -> bool | None:
 def shown_without_model(
     data: DataSet, model: Model, allowed: Sequence[Term], axis: InverseDynamics | None = None
 ) -> frozenset[str]:
-    """Families and names of the effects that the records show without any simulation: dry friction, and a steep drag."""
+    """Families and names of what the records show without a simulation: dry friction, and friction that bends over the speed."""
     shown = {t.family for t in allowed if t.levels} if friction_shown(data, model, axis) else set()
     if any(t.bends for t in allowed) and _steep_shown(data, model):
         shown |= {t.name for t in allowed if t.bends}
