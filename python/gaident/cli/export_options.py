@@ -42,7 +42,7 @@ def add_export_options(parser: argparse.ArgumentParser) -> None:
     """What `gaident export` takes."""
     parser.add_argument("result", metavar="RESULT.json", help="what diagnose --out or identify --out saved")
     parser.add_argument("--to", required=True, choices=tuple(FORMS), help="for which tool")
-    parser.add_argument("--out", metavar="FILE", help="where to write (default: RESULT.c, .fmu, .py, ... here)")
+    parser.add_argument("-o", "--out", metavar="FILE", help="where to write (default: RESULT.c, .fmu, .py, ... here)")
     parser.add_argument("--dt", type=number, metavar="S", help="of C and FMU: sample time of the steps [s]")
     parser.add_argument(
         "--closed", action="store_true", help="of C and FMU: with the controller of the result, command to velocity"

@@ -32,7 +32,7 @@ def add_fleet_options(parser: argparse.ArgumentParser) -> None:
     """What `gaident fleet` takes beside the options of logs and of the controller."""
     parser.add_argument("logs", nargs="+", metavar="LOG", help="log files, or patterns in quotes, such as 'logs/**/*.csv'")
     g = parser.add_argument_group("the fleet")
-    g.add_argument("--out", metavar="DIR", default="fleet.parquet", help="folder of the dataset (default: fleet.parquet)")
+    g.add_argument("-o", "--out", metavar="DIR", default="fleet.parquet", help="folder of the dataset (default: fleet.parquet)")
     names = "regular expression that finds (?P<axis>...) and (?P<time>...) in a path (default: folder, and date in a name)"
     g.add_argument("--names", metavar="REGEX", help=names)
     g.add_argument("--temperature", metavar="NAME", help="column with the temperature, whose mean stands in the tables")
@@ -48,6 +48,6 @@ def add_trends_options(parser: argparse.ArgumentParser) -> None:
     """What `gaident trends` takes."""
     parser.add_argument("fleet", metavar="FLEET", help="the folder that gaident fleet wrote")
     g = parser.add_argument_group("results")
-    g.add_argument("--out", metavar="FILE", help="write it as one HTML page, which needs no network")
+    g.add_argument("-o", "--out", metavar="FILE", help="write it as one HTML page, which needs no network")
     g.add_argument("--no-reports", dest="reports", action="store_false", help="without the reports that the page opens")
     g.add_argument("--json", action="store_true", help="print JSON instead of text")

@@ -168,7 +168,7 @@ def add_log_commands(command: Callable[..., Any]) -> None:
 
     sub = command("init", "LOG ", "log -> a drive.toml to be completed", INIT_HELP, INIT_EXAMPLES)
     sub.add_argument("log", metavar="LOG", help="log file")
-    sub.add_argument("--out", metavar="FILE", default="drive.toml", help="where to write (default: drive.toml)")
+    sub.add_argument("-o", "--out", metavar="FILE", default="drive.toml", help="where to write (default: drive.toml)")
     sub.add_argument("--force", action="store_true", help="overwrite the file if there is one")
     _add_text_options(sub)
     sub.add_argument("--json", action="store_true", help="print what was found and what is to be filled in as JSON")
@@ -186,7 +186,7 @@ def add_log_commands(command: Callable[..., Any]) -> None:
     sub.add_argument("--kp", type=number, metavar="X", help="the controller's gain [N m s/rad]: jumps then keep to the torque")
     inertia = "total inertia [kg m^2]: ramps then keep to the torque, that of HIGH"
     sub.add_argument("--inertia", nargs=2, type=number, metavar=("LOW", "HIGH"), help=inertia)
-    sub.add_argument("--out", metavar="FILE", help="CSV file (default: standard output)")
+    sub.add_argument("-o", "--out", metavar="FILE", help="CSV file (default: standard output)")
     sub.add_argument("--json", action="store_true", help="print JSON instead of CSV")
 
     sub = command("doctor", "", "versions, instruction set, threads, optional libraries, self test", DOCTOR_HELP)

@@ -173,7 +173,7 @@ def parser_of(commands: Mapping[str, str]) -> argparse.ArgumentParser:
         help="auto: estimated for records that do not start at rest (default)",
     )
     g = sub.add_argument_group("results")
-    g.add_argument("--out", metavar="FILE", help="save the identification (JSON)")
+    g.add_argument("-o", "--out", metavar="FILE", help="save the identification (JSON)")
     g.add_argument("--plot", metavar="FILE", help=f"draw measured against simulated ({', '.join(PICTURES)})")
     add_report_option(g)
     g.add_argument("--json", action="store_true", help="print what --out saves instead of the summary")
@@ -202,7 +202,7 @@ def parser_of(commands: Mapping[str, str]) -> argparse.ArgumentParser:
     g.add_argument("--stability", action="store_true", help=text)
     g.add_argument("--seed", type=int, default=0, metavar="N", help="same seed, same result (default 0)")
     g = sub.add_argument_group("results")
-    g.add_argument("--out", metavar="FILE", help="save the diagnosis (JSON)")
+    g.add_argument("-o", "--out", metavar="FILE", help="save the diagnosis (JSON)")
     g.add_argument("--plot", metavar="FILE", help=f"draw what is wrong and what is left ({', '.join(PICTURES)})")
     add_report_option(g)
     g.add_argument("--next-command", metavar="FILE", help="write the proposed experiment's command (CSV)")
@@ -234,7 +234,7 @@ def parser_of(commands: Mapping[str, str]) -> argparse.ArgumentParser:
         help="auto: estimated for records that do not start at rest (default)",
     )
     g = sub.add_argument_group("results")
-    g.add_argument("--out", metavar="PATH", help="CSV file; a folder where several logs are given")
+    g.add_argument("-o", "--out", metavar="PATH", help="CSV file; a folder where several logs are given")
     g.add_argument("--json", action="store_true", help="print everything as JSON instead of CSV")
 
     add_log_commands(command)
@@ -258,12 +258,12 @@ def parser_of(commands: Mapping[str, str]) -> argparse.ArgumentParser:
     sub.add_argument("--json", action="store_true", help="print JSON instead of a table")
 
     sub = command("demo", "", "the main job, on data of its own", DEMO_HELP)
-    sub.add_argument("--out", metavar="DIR", default=".", help="where pictures go (default: the current folder)")
+    sub.add_argument("-o", "--out", metavar="DIR", default=".", help="where pictures go (default: the current folder)")
     _add_run_options(sub)
     sub.add_argument("--json", action="store_true", help="print JSON instead of text")
 
     sub = command("reproduce", "", "the paper's tables and figures, reproduced and checked", REPRODUCE_HELP)
-    sub.add_argument("--out", metavar="DIR", default=".", help="where paper.html and its pictures go (default: here)")
+    sub.add_argument("-o", "--out", metavar="DIR", default=".", help="where paper.html and its pictures go (default: here)")
     sub.add_argument("--trials", type=int, default=20, metavar="N", help="genetic runs per engine and mechanism (default 20)")
     sub.add_argument("--seeds", type=int, default=100, metavar="N", help="noise seeds against least squares (default 100)")
     _add_run_options(sub)

@@ -56,7 +56,7 @@ def add_retune_options(parser: argparse.ArgumentParser) -> None:
     g.add_argument("--no-filters", action="store_true", help="add no low pass and no notch to a cascade")
     g.add_argument("--seed", type=int, default=0, metavar="N", help="same seed, same result (default 0)")
     g = parser.add_argument_group("results")
-    g.add_argument("--out", metavar="FILE", help="save the retuning (JSON)")
+    g.add_argument("-o", "--out", metavar="FILE", help="save the retuning (JSON)")
     g.add_argument("--plot", metavar="FILE", help="draw the loop and its step before and after (.png, .pdf, .svg)")
     g.add_argument("--axis", choices=AXES, help="words and units (default: those of the result)")
     g.add_argument("--json", action="store_true", help="print what --out saves instead of the summary")

@@ -30,7 +30,7 @@ def add_report_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("logs", nargs="*", metavar="LOG", help="further results (.json), and the logs they were made from")
     parser.add_argument("--validation", nargs="+", metavar="LOG", help="the logs that were held out")
     g = parser.add_argument_group("results")
-    g.add_argument("--out", metavar="FILE", default="report.html", help="where the page goes (default: report.html)")
+    g.add_argument("-o", "--out", metavar="FILE", default="report.html", help="where the page goes (default: report.html)")
     _add_pictures(g)
     g.add_argument("--json", action="store_true", help="print what was written as JSON")
 

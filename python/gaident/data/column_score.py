@@ -13,6 +13,8 @@ __all__ = ["COMMANDED_QUANTITY", "spoken_for"]
 
 COMMANDED_QUANTITY = {"command": "velocity", "position_command": "position"}
 """Channel that is a command -> the quantity that it commands."""
+CALLED = {"torque": "torque or current"}
+"""Quantity -> what a column of it may be called, where that is more."""
 
 
 def spoken_for(names: Sequence[str], unit: str | None, channel: str) -> tuple[int, str, bool]:
@@ -32,7 +34,8 @@ def spoken_for(names: Sequence[str], unit: str | None, channel: str) -> tuple[in
         score = 0 if said.commanded else score + (1 if said.measured else 0)  # a command is no measurement, whatever its unit
     else:
         score += 1 if said.commanded else 0  # what the controller issued rather than what was measured
-    why = [f"its name says {quantity}" if by_name else "", f"its unit is one of {quantity}" if fits else ""]
+    called = CALLED.get(quantity, quantity)
+    why = [f"its name says {called}" if by_name else "", f"its unit is one of {called}" if fits else ""]
     if channel in COMMANDED_QUANTITY and said.commanded:
         why.append("its name says that it is a command")
     return score, ", ".join(filter(None, why)), said.unsure

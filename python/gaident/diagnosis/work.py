@@ -19,7 +19,7 @@ from gaident.diagnosis.controller.joint_numbers import joint_numbers
 from gaident.diagnosis.experiments.candidates import candidates, loop_notes, unresolved
 from gaident.diagnosis.experiments.excitation import excitation
 from gaident.diagnosis.explain.alternatives import LOG_SHIFT, alike_here, alternatives_of, impossible_here, integrator_start
-from gaident.diagnosis.explain.bending import bent_by, relevance_of
+from gaident.diagnosis.explain.bending import relevance_of
 from gaident.diagnosis.explain.beside import friction_beside, late_together
 from gaident.diagnosis.explain.determined import determined, not_determined
 from gaident.diagnosis.explain.held_out import standing
@@ -333,7 +333,7 @@ class Work:
             regression=check.regression,
             regression_force_error=check.force_error,
             comparisons=check.comparisons,
-            relevance=relevance_of(check.after, gains.floor, bent_by(driver, self.left, self.under, self.estimate, mechanics)),
+            relevance=relevance_of(check.after, gains.floor, driver, self.left, self.under, self.estimate, mechanics),
             force_reason=check.reason,
             notes=tuple(self.notes),
             identification=self.idn,

@@ -323,6 +323,13 @@ class _Draft:
         driven = positioned or "command" in self.guess.channels
         mark = self._todo if driven else lambda line, _, comment: line_of(line, comment)
         torque = word("torque", self.axis)
+        open_loop = f"without a command the {torque} drives the model"
+        if driven:
+            loop = line_of('# loop = "sampled"', f'a digital drive; or "continuous"; or "open": the {torque} drives the model')
+        elif self._asked("command", "torque"):
+            loop = self._todo('# loop = "open"', "controller.loop", f"{open_loop}; with a command give kp and ki in its place")
+        else:
+            loop = line_of('loop = "open"', open_loop)
         return [
             mark("# kp = 0.0232", "controller.kp", f"{unit('N m s/rad', self.axis)}; proportional gain {text}"),
             mark(
@@ -334,9 +341,7 @@ class _Draft:
             line_of('# rule = "backward"', 'of the integral, or "forward"; left out: "trapezoidal"'),
             line_of("# torque_limit = 2.4", "a known limit of the controller, and integrator_limit"),
             *(self._position_controller() if positioned else []),
-            line_of('# loop = "sampled"', f'a digital drive; or "continuous"; or "open": the {torque} drives the model')
-            if driven
-            else line_of('loop = "open"', f"without a command the {torque} drives the model"),
+            loop,
             line_of('# anti_windup = "hold"', 'at a torque_limit; or "tracking" with tracking_time'),
             line_of('# drive = "sinamics"', "with p1460 and p1462 in place of kp and ki: gains as the drive shows them"),
         ]

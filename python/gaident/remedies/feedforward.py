@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from gaident.arguments import arg
@@ -122,7 +124,12 @@ def _wave(effect: Effect, row: Cause) -> Wave:
 
 
 def _notes(result: Diagnosis, left: list[Text]) -> list[Text]:
-    found = []
+    contained = {effect.key for effect in result.model.effects}
+    found = [
+        say("The tables take {} for granted: these data do not tell it from {}.", name_in_words(f.effect), _or(f.alternatives))
+        for f in result.findings
+        if f.alternatives and f.effect in contained and LIBRARY[f.effect].place == SHAFT
+    ]
     if left:
         found.append(say("The tables do not contain {}: it has no curve over the velocity.", joined(", ", left)))
     if any(effect.row.place == "mechanism" for effect in result.model.effects):
@@ -135,6 +142,10 @@ def _notes(result: Diagnosis, left: list[Text]) -> list[Text]:
     if any(row.time_varying for row in rows):
         found.append(say("The friction changes in the course of the record: the table has that of its start."))
     return found
+
+
+def _or(names: Sequence[str]) -> Text:
+    return joined(" or ", [name_in_words(name) for name in names])
 
 
 def _speed_of(result: Diagnosis, speed: float | None) -> float:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from typing import Any
 
 __all__ = ["Relevance"]
@@ -31,6 +31,9 @@ class Relevance:
         What was asked for [rad/s], [N m]; None: nothing.
     bent : tuple of str
         Names in `Diagnosis.mechanics` that what is left can have moved by more than their standard deviation.
+    shares : mapping of str to float
+        Part of the squared error, before whitening, that a free function of each driver takes away, 0 to 1; empty where nothing
+        is left of it, and in older files.
 
     See Also
     --------
@@ -44,6 +47,7 @@ class Relevance:
     velocity_accuracy: float | None = None
     torque_accuracy: float | None = None
     bent: tuple[str, ...] = ()
+    shares: Mapping[str, float] = field(default_factory=dict, hash=False)
 
     @property
     def asked(self) -> bool:
@@ -63,7 +67,7 @@ class Relevance:
 
     def to_dict(self) -> dict[str, Any]:
         """Return plain data for JSON."""
-        return {**asdict(self), "bent": list(self.bent)}
+        return {**asdict(self), "bent": list(self.bent), "shares": dict(self.shares)}
 
     @classmethod
     def from_dict(cls, data: Mapping[str, Any]) -> Relevance:

@@ -13,8 +13,18 @@ from gaident.results.diagnosis import Diagnosis
 from gaident.results.estimate import Estimate, of_axis
 from gaident.results.experiment import Proposal
 from gaident.results.finding import Finding
+from gaident.show.gain_words import (
+    alone_words,
+    comparison_rows,
+    fall_words,
+    force_rows,
+    force_words,
+    method_words,
+    noise_rows,
+    noise_words,
+    not_the_loop_words,
+)
 from gaident.show.relevance_words import bent_of, part_words, relevance_words, remark_words
-from gaident.show.second_method import comparison_rows, force_rows, force_words, method_words
 from gaident.show.units import Scales, beside, scales_of, with_column
 from gaident.show.wording import (
     NOT_AS_GIVEN,
@@ -23,7 +33,6 @@ from gaident.show.wording import (
     cause_words,
     certainty,
     controller_lines,
-    diverges,
     either,
     free_run_words,
     missing_words,
@@ -40,12 +49,10 @@ __all__ = [
     "chance_words",
     "diagnosis_summary",
     "driver_counts",
-    "fall_words",
     "left_words",
     "mechanical_name",
     "moved_words",
     "next_words",
-    "noise_words",
     "parameter_row",
     "verdict_words",
 ]
@@ -109,8 +116,9 @@ def left_words(dia: Diagnosis, axis: str) -> str:
         like = say(": like a {torque} of {} Hz and {} {N m} at the motor", number(frequency, 3), number(amplitude, 2))
     if driver_counts(dia):
         return said(say("What is left depends {}{}.", DRIVERS[dia.driver], like), axis)
-    text = "No single signal explains what is left; what comes closest depends {}{}."
-    return said(say(text, DRIVERS[dia.driver], like), axis)
+    text = said(say("No single signal explains what is left; what comes closest depends {}{}.", DRIVERS[dia.driver], like), axis)
+    share = None if dia.relevance is None else dia.relevance.shares.get(dia.driver)
+    return text if share is None else f"{text} A free function of it takes {100.0 * share:.2g} % of the squared error away."
 
 
 def driver_counts(dia: Diagnosis) -> bool:
@@ -182,11 +190,12 @@ def _gain(dia: Diagnosis, axis: str, scales: Scales) -> list[str]:
         ("", f"rmse [{v}]", "fit [%]"),
         ("linear model", *free_run_words(dia.before)),
         ("extended model", *free_run_words(dia.after)),
-        ("noise of the measured velocity", number(dia.after.noise_floor), ""),
+        *((what, number(size), "") for what, size in noise_rows(dia)),
     ]
-    rows = with_column(rows, "rmse", (dia.before.rmse, dia.after.rmse, dia.after.noise_floor), v, scales)
+    sizes = (dia.before.rmse, dia.after.rmse, *(size for _, size in noise_rows(dia)))
+    rows = with_column(rows, "rmse", sizes, v, scales)
     where = "IN-SAMPLE: too little data, or too little motion, to hold any out" if dia.in_sample else f"on {dia.held_out}"
-    lines = [f"Free-run simulation, {where}", *table(rows if extended else [rows[0], rows[1], rows[3]])]
+    lines = [f"Free-run simulation, {where}", *table(rows if extended else rows[:2] + rows[3:])]
     if noise := noise_words(dia):
         lines += _wrapped(said(noise, axis), "  ")
     if not dia.loop_follows:
@@ -196,29 +205,9 @@ def _gain(dia: Diagnosis, axis: str, scales: Scales) -> list[str]:
         steps = [f"{cause_words(f, dia, axis)} {step_words(f.gain)}" for f in dia.findings if not f.is_noise]
         if len(steps) > 1:
             lines += _wrapped(f"The error with one after the other, against that before it: {', '.join(steps)}.", "  ")
+        if alone := alone_words(dia):
+            lines += _wrapped(alone, "  ")
     return lines
-
-
-def noise_words(dia: Diagnosis) -> Text:
-    """What an encoder's steps make of the noise, where a free run leaves less than what was estimated; empty elsewhere."""
-    found = (f.parameters["step"] for f in dia.findings if f.is_noise and "step" in f.parameters)
-    step = next((e.value for e in found if e.unit == "rad/s"), None)
-    if step is None or dia.noise is not None or not dia.after.rmse < dia.after.noise_floor:
-        return Text("")
-    text = (
-        "The free run leaves less than this noise, which is estimated from third differences as if it were white. Steps of {} "
-        "{rad/s} make {} {rad/s} rms where the velocity itself is rounded, and {} {rad/s} where it is the difference of two "
-        "rounded {angles}: that noise is not white."
-    )
-    return say(text, number(step), number(step / math.sqrt(12.0), 3), number(step / math.sqrt(6.0), 3))
-
-
-def not_the_loop_words(dia: Diagnosis) -> Text:
-    """What the free runs are, where the given controller is not the drive's."""
-    if dia.torque_logged:
-        text = "The logged {torque} does not follow from this controller (see above): it drives these models, no loop is closed."
-        return say(text)
-    return Text("The simulated controller is not the drive's (see above): these figures include its errors.")
 
 
 def _force(dia: Diagnosis, axis: str, scales: Scales) -> list[str]:
@@ -237,61 +226,6 @@ def _second_method(dia: Diagnosis, axis: str) -> list[str]:
         return []
     head = ("", "diagnosis", "regression", "", "")
     return ["Check by inverse-dynamics regression", *table([head, *rows]), *_wrapped(method_words(dia, axis), "  ")]
-
-
-def fall_words(dia: Diagnosis) -> str:
-    """By how much the error falls, in words."""
-    if diverges(dia.after):
-        linear = "so does the linear one" if diverges(dia.before) else "the linear one does not"
-        return Text(f"In free run the extended model diverges, {linear}.")
-    if diverges(dia.before):
-        return Text("In free run the linear model diverges, the extended one does not.")
-    fall = 100.0 * (1.0 - dia.after.rmse / dia.before.rmse)  # no decision: a unit: percent
-    low, high = (100.0 * x for x in dia.gain_interval)
-    if fall < -1.0:
-        return _growth_words(dia, -fall)
-    if fall < 1.0:
-        if dia.before.rmse < POLICY.noise_ratio * dia.before.noise_floor:
-            hidden = Text(": it is at the noise with and without")
-        elif dia.controller is None or not dia.controller.one_equation:
-            hidden = Text("")
-        elif dia.torque_logged:
-            hidden = say(": the loop's integrator hides this effect in the velocity, the {torque} shows it")
-        else:
-            hidden = Text(": the loop's integrator hides this effect in the velocity")
-        return say("The error of the velocity hardly changes ({:+.1f} %){}.", -fall, hidden)
-    digits = next((d for d in range(4) if f"{low:.{d}f}" != f"{high:.{d}f}"), None) if math.isfinite(low) else None
-    interval = f" (95 % interval {low:.{digits}f} to {high:.{digits}f} %)" if digits is not None else ""
-    return say("The error falls by {:.{}f} %{}.", fall, digits or 0, interval)
-
-
-def _growth_words(dia: Diagnosis, growth: float) -> Text:
-    """Why the error of the velocity grows, by so many percent, and what the names rest on then."""
-    if not dia.loop_follows:
-        text = (
-            "In free run the extended model is worse than the linear one (the error of the velocity grows by {:.0f} %): the "
-            "simulated controller is not the drive's."
-        )
-        return say(text, growth)
-    varies = "beyond" if dia.gain_interval[1] < 0.0 else "within"
-    grows = say(
-        "In free run the extended model is worse than the linear one: the error of the velocity grows by {:.0f} %, {} its "
-        "variation over the record",
-        growth,
-        varies,
-    )
-    before, after = dia.before.force_error, dia.after.force_error
-    if after is not None and (before is None or after < before):
-        was = "diverges without the effects" if before is None else f"was {number(before)}"
-        stands = ", and what is named stands by that" if any(not f.is_noise for f in dia.findings) else ""
-        return say("{}; that of the {torque} falls ({}, is {} {N m}){}: see the next table.", grows, was, number(after), stands)
-    if dia.controller is None:
-        return say("{}: the effects, as fitted, do not hold on these data.", grows)
-    text = (
-        "{}: the effects were found on the error of the model driven by the {torque}; closed over this controller (its gains, "
-        "rule and limits) or over other records they do not hold."
-    )
-    return say(text, grows)
 
 
 def _mechanics(dia: Diagnosis, axis: str) -> list[str]:

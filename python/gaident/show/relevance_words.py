@@ -29,17 +29,21 @@ def relevance_words(dia: Diagnosis, axis: str, scales: Scales) -> str:
         for value, si, name in ((r.velocity_accuracy, v, "velocity"), (r.torque_accuracy, u, torque))
         if value is not None
     ]
-    begun = f"Beyond the noise it is {size}" if dia.driver is not None else f"What is left beyond the noise is {size}"
+    it = "it is" if dia.driver is not None else "what is left is"
+    begun = f"Beyond what noise leaves {it} {size}"
+    noise = f"noise alone leaves {_shown(r.noise, v, scales)} of a free run"
+    if r.torque_noise is not None:
+        noise += f" and {_shown(r.torque_noise, u, scales)} of the {torque}"
     if asked and r.negligible:
         return f"{begun}: negligible, as the accuracy that was asked for is {' and '.join(asked)}."
     if asked:
         surely = "" if dia.driver is not None else ", though nothing of it is significant"
         return f"{begun}: the accuracy that was asked for, {' and '.join(asked)}, is not met{surely}."
     if not r.velocity and not r.torque:
-        return "It is less than the noise: significant, but negligible."
+        return f"In size it is negligible: {noise}, and the model leaves no more. Significant means that chance does not make it."
     if r.negligible:
-        return f"{begun}: significant, but negligible, as it is less than the noise."
-    return f"{begun}; the noise is {_shown(r.noise, v, scales)}."
+        return f"{begun}. In size that is negligible: {noise}. Significant means that chance does not make it."
+    return f"{begun}; {noise}."
 
 
 def part_words(dia: Diagnosis, finding: Finding, axis: str, scales: Scales) -> str:

@@ -109,6 +109,21 @@ def test_the_gains_are_asked_for_in_a_position_loop_too(run: ga.Record) -> None:
     assert re.search('^# rule = "backward" ', text, re.MULTILINE) and re.search('^# anti_windup = "hold" ', text, re.MULTILINE)
 
 
+def test_the_loop_is_asked_for_where_neither_command_nor_torque_is_found(run: ga.Record) -> None:
+    """Each may be among the columns that say nothing; both together leave no line that contradicts the other."""
+    written(
+        "run.csv",
+        ["t [ms]", "n_act [rpm]", "x1", "x2"],
+        np.column_stack([1e3 * run.time, RPM * run.velocity, run.time, run.torque]),
+    )
+    assert main(["init", "run.csv", "-o", "axis.toml"]) == 0
+    text = Path("axis.toml").read_text(encoding="utf-8")
+    assert re.search(r"^# command = .*FILL IN", text, re.MULTILINE) and re.search(
+        r'^# loop = "open" .*FILL IN', text, re.MULTILINE
+    )
+    assert not re.search(r"^loop", text, re.MULTILINE)
+
+
 def test_without_a_command_the_torque_drives_the_model(run: ga.Record) -> None:
     """The file is taken as it is; a voltage beside a current is offered for the winding."""
     assert run.torque is not None
@@ -119,6 +134,7 @@ def test_without_a_command_the_torque_drives_the_model(run: ga.Record) -> None:
     text = Path("drive.toml").read_text(encoding="utf-8")
     assert re.search(r'^loop = "open" ', text, re.MULTILINE) and re.search(r'^position = "Grad" ', text, re.MULTILINE)
     assert re.search(r'^# voltage = "Spannung \[V\]"', text, re.MULTILINE)
+    assert "# its name says torque or current, its unit is one of torque or current" in text
     filled("drive.toml", torque_constant="0.06", torque_is='"measured"')
     assert main(["identify", "motor.csv", "--drive", "drive.toml", "--quiet"]) == 0
     offered = re.sub(r"^# voltage", "voltage", re.sub(r"^torque = ", "current = ", text, flags=re.MULTILINE), flags=re.MULTILINE)

@@ -95,6 +95,15 @@ def test_the_curve_of_each_effect_counts_and_what_has_none_is_said(found: ga.Dia
     assert "changes with the position" in said.summary(axis="linear") and "N m" not in said.summary(axis="linear")
 
 
+def test_a_cause_that_is_not_told_from_another_is_said_to_be_taken_for_granted(found: ga.Diagnosis) -> None:
+    finding = ga.Finding("load_torque", {}, alternatives=("asymmetric_friction",), gain=0.5)
+    model = DRIVE.with_effect("coulomb_friction", torque=0.05).with_effect("load_torque", torque=0.02)
+    tables = ga.feedforward(replace(found, model=model, findings=(*found.findings, finding)), speed=9.0)
+    text = "The tables take {} for granted: these data do not tell it from asymmetric friction."
+    assert text.format("load torque") in tables.notes and text.format("load force") in tables.summary(axis="linear")
+    assert not any("for granted" in note for note in ga.feedforward(found, speed=9.0).notes)
+
+
 @pytest.mark.parametrize("turning", [True, False])
 def test_the_c_file_says_the_same(tables: ga.FeedforwardTables, turning: bool, tmp_path: Path) -> None:
     tables = tables if turning else replace(tables, waves=())

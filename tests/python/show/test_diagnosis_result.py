@@ -21,6 +21,7 @@ from gaident.diagnosis.explain.wording import evidence_of
 from gaident.errors import GaidentError, RecordError, SettingsError
 from gaident.results.diagnosis import Comparison, Fitness
 from gaident.results.finding import Finding
+from gaident.results.relevance import Relevance
 from gaident.show.report.diagnosis import headline
 from gaident.show.wording import certainty, step_words
 from places import GOLDEN
@@ -81,7 +82,17 @@ def fake() -> Any:
         model=SimpleNamespace(effects=("coulomb_friction", "cogging"), poles=(-1.0, -1.0 + 2.0j, -1.0 - 2.0j), p=1, q=2),
         before=Fitness(0.5, 97.1, 0.1, 0.0511, 0.184, 0.0021),
         after=Fitness(0.2, 98.84, 0.1, 0.0123, 0.184, 0.0021),
-        regression=SimpleNamespace(terms=("inertia", "viscous", "coulomb"), cutoff_hz=12.34, order=4, samples=812),
+        regression=SimpleNamespace(
+            terms=("inertia", "viscous", "coulomb"),
+            parameters={
+                "inertia": ga.Estimate(6.91e-4, 4e-6, "kg m^2"),
+                "viscous": ga.Estimate(0.0108, 0.0003, "N m s/rad"),
+                "coulomb": ga.Estimate(0.0522, 0.0006, "N m"),
+            },
+            cutoff_hz=12.34,
+            order=4,
+            samples=812,
+        ),
         regression_force_error=0.0119,
         comparisons=(
             Comparison("inertia", ga.Estimate(6.88e-4, 1.2e-6, "kg m^2"), ga.Estimate(6.91e-4, 4e-6, "kg m^2"), False),
@@ -142,6 +153,31 @@ def test_a_driver_that_does_not_count_is_only_the_closest(left: dict[str, float]
     text = " ".join(summary(dia).split())
     assert "No single signal explains what is left; what comes closest depends on the position." in text
     assert "What is left depends" not in text
+
+
+def test_the_share_of_the_closest_is_said_where_it_is_known() -> None:
+    left = Relevance(0.2, 0.1, shares={"position": 0.043, "time": 0.002})
+    more = {"driver": "position", "left": {"position": -5.0, "time": -3.0}, "line": None, "relevance": left}
+    text = " ".join(summary(SimpleNamespace(**{**vars(fake()), **more})).split())
+    assert "depends on the position. A free function of it takes 4.3 % of the squared error away." in text
+
+
+def test_what_the_noise_of_a_measured_torque_leaves_stands_beside_that_of_the_velocity() -> None:
+    def rows(**more: Any) -> list[list[str]]:
+        return [line.split() for line in summary(SimpleNamespace(**{**vars(fake()), **more})).splitlines()]
+
+    own, both = ["noise", "of", "the", "measured", "velocity", "0.1"], ["with", "that", "of", "the", "torque", "0.17"]
+    assert own in rows(relevance=Relevance(0.2, 0.17)) and both in rows(relevance=Relevance(0.2, 0.17))
+    for same in (rows(relevance=Relevance(0.2, 0.1)), rows()):
+        assert own in same and not any(row[:2] == ["with", "that"] for row in same)
+
+
+def test_a_cause_with_which_the_error_grows_as_long_as_another_is_missing() -> None:
+    text = "One cause alone may make the error of a free run larger, as long as another one is missing: judge by all together."
+    noise, first, second, *_ = fake().findings
+    for gain, told in ((-0.09, True), (0.09, False)):
+        findings = [noise, replace(first, gain=gain), replace(second, gain=0.9)]
+        assert (text in " ".join(summary(SimpleNamespace(**{**vars(fake()), "findings": findings})).split())) == told
 
 
 def test_a_number_that_was_zero_within_its_deviation_moved_by_no_share() -> None:

@@ -88,18 +88,22 @@ def said(relevance: Relevance | None, driver: str | None = "position", **more: A
 def test_the_size_is_in_the_users_unit_with_si_behind() -> None:
     left = Relevance(0.1, 0.3, 0.002, 0.004)
     assert said(left) == (
-        "Beyond the noise it is 0.95 rpm (0.1 rad/s) rms in the velocity and 0.002 N m rms in the torque: significant, but "
-        "negligible, as it is less than the noise."
+        "Beyond what noise leaves it is 0.95 rpm (0.1 rad/s) rms in the velocity and 0.002 N m rms in the torque. In size that "
+        "is negligible: noise alone leaves 2.9 rpm (0.3 rad/s) of a free run and 0.004 N m of the torque. Significant means that "
+        "chance does not make it."
     )
-    assert said(Relevance(0.4, 0.3)).endswith("rms in the velocity; the noise is 2.9 rpm (0.3 rad/s).")
-    assert "and nothing in the torque; the noise" in said(Relevance(0.4, 0.3, 0.0, 0.01))
+    assert said(Relevance(0.4, 0.3)).endswith("rms in the velocity; noise alone leaves 2.9 rpm (0.3 rad/s) of a free run.")
+    assert "and nothing in the torque; noise alone leaves" in said(Relevance(0.4, 0.3, 0.0, 0.01))
     asked = Relevance(0.4, 0.3, 0.002, 0.004, 0.5, 0.001)
     assert said(asked).endswith(
         "that was asked for, 4.8 rpm (0.5 rad/s) of the velocity and 0.001 N m of the torque, is not met."
     )
     assert "is not met, though nothing of it is significant" in said(asked, None)
     assert said(left, None) == "" == said(None)
-    assert said(Relevance(0.0, 0.3, 0.0, 0.004)) == "It is less than the noise: significant, but negligible."
+    assert said(Relevance(0.0, 0.3, 0.0, 0.004)) == (
+        "In size it is negligible: noise alone leaves 2.9 rpm (0.3 rad/s) of a free run and 0.004 N m of the torque, and the "
+        "model leaves no more. Significant means that chance does not make it."
+    )
 
 
 def test_a_finding_beside_the_accuracy() -> None:

@@ -26,14 +26,14 @@ from gaident.results.estimate import Estimate
 from gaident.results.fitness import Fitness
 from gaident.results.relevance import Relevance
 
-__all__ = ["bent_by", "relevance_of"]
+__all__ = ["relevance_of"]
 
 SINGULAR_RANK = 1e-6  # no decision: of the largest singular value: less is rounding
 
 Matrix = NDArray[np.float64]
 
 
-def bent_by(
+def _bent_by(
     driver: str | None, left: Dependence, objective: Objective, fit: Fit, mechanics: Mapping[str, Estimate]
 ) -> tuple[str, ...]:
     """The names of what a free function of a signal that counts can have moved beyond its deviation; () where nothing is left.
@@ -78,12 +78,22 @@ def _bent_beside(C: Matrix, objective: Objective, fit: Fit, mechanics: Mapping[s
     return found
 
 
-def relevance_of(after: Fitness, floor: float, bent: tuple[str, ...]) -> Relevance:
-    """What is left beyond the noise; floor: what noise leaves of the free run [rad/s]."""
+def relevance_of(
+    after: Fitness,
+    floor: float,
+    driver: str | None,
+    left: Dependence,
+    objective: Objective,
+    fit: Fit,
+    mechanics: Mapping[str, Estimate],
+) -> Relevance:
+    """What is left beyond the noise, and what it bends; floor: what noise leaves of the free run [rad/s]."""
+    bent = _bent_by(driver, left, objective, fit, mechanics)
     torque = None
     if after.force_error is not None and after.force_floor is not None:
         torque = _beyond(after.force_error, after.force_floor)
-    return Relevance(_beyond(after.rmse, floor), floor, torque, after.force_floor if torque is not None else None, bent=bent)
+    torque_floor = after.force_floor if torque is not None else None
+    return Relevance(_beyond(after.rmse, floor), floor, torque, torque_floor, bent=bent, shares=left.shares)
 
 
 def _beyond(error: float, noise: float) -> float:

@@ -51,6 +51,11 @@ class Dependence:
     rest: float = 0.0
 
     @property
+    def shares(self) -> dict[str, float]:
+        """Part of the squared error before whitening that each driver's family takes away; empty where there is none."""
+        return {d: 1.0 - left / self.rest for d, left in self.unwhitened.items()} if self.rest > 0.0 else {}
+
+    @property
     def strongest(self) -> str | None:
         """The driver that explains most, counted or not: of whitened errors by gain, of output errors by what is left."""
         if not self.whitened:

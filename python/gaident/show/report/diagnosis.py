@@ -4,26 +4,20 @@ from __future__ import annotations
 
 import base64
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 
 from gaident.axis import said, unit, velocity_unit, word
 from gaident.models.factors import gain_unit
 from gaident.results.diagnosis import Diagnosis
 from gaident.results.estimate import Estimate
 from gaident.results.finding import Finding
-from gaident.results.fitness import Fitness
 from gaident.show.diagnosis_summary import (
-    DRIVERS,
     TESTED_UP_TO,
     chance_words,
-    driver_counts,
-    fall_words,
     left_words,
     mechanical_name,
     moved_words,
     next_words,
-    noise_words,
-    not_the_loop_words,
     parameter_row,
 )
 from gaident.show.html import Html, Row, joined, number, table, tag, typeset
@@ -31,6 +25,7 @@ from gaident.show.relevance_words import bent_of, part_words, relevance_words, r
 from gaident.show.report import charts
 from gaident.show.report.command import proposal_csv
 from gaident.show.report.controller_words import controller_words
+from gaident.show.report.gain import gain_section
 from gaident.show.report.parts import (
     Charts,
     Head,
@@ -40,7 +35,6 @@ from gaident.show.report.parts import (
     facts,
     measured_section,
     missing_section,
-    needs_record,
     records_table,
     response_part,
     roots_table,
@@ -49,15 +43,12 @@ from gaident.show.report.parts import (
 from gaident.show.report.remedies import remedies_section
 from gaident.show.report.stability import stability_section
 from gaident.show.report.views import View
-from gaident.show.second_method import comparison_rows, force_rows, force_words, method_words
-from gaident.show.units import with_column
 from gaident.show.wording import (
     NOT_AS_GIVEN,
     SPREAD,
     cause_words,
     diverges,
     either,
-    free_run_words,
     missing_words,
     not_as_given,
     step_words,
@@ -157,7 +148,7 @@ def chapters(dia: Diagnosis, view: View, drawn: Charts) -> list[Section]:
         _causes(dia, view),
         *stability_section(view),
         _parameters(dia, view, drawn),
-        _gain(dia, view, drawn),
+        gain_section(dia, view, drawn),
         remedies_section(view, drawn),
         _untested(dia, view),
         _next(dia, view, drawn),
@@ -242,86 +233,6 @@ def _parameters(dia: Diagnosis, view: View, drawn: Charts) -> Section:
     parts.append(roots_table(roots))
     parts.append(response_part(view, drawn))
     return Section("parameters", "Parameters", *parts)
-
-
-def _free_run(run: Fitness) -> tuple[str, Html]:
-    rmse, fit = free_run_words(run, number)
-    return rmse, typeset(fit)
-
-
-def _in_units(rows: Sequence[tuple[str, ...]], what: str, sizes: Sequence[float], si: str, view: View) -> Html:
-    """A table, the first of the rows its head, with the sizes [si] in the user's unit too."""
-    head, *body = with_column(rows, what, sizes, si, view.scales)
-    return table(head, [body])
-
-
-def _gain(dia: Diagnosis, view: View, drawn: Charts) -> Section:
-    axis = view.axis
-    v = velocity_unit(axis)
-    extended = bool(dia.model.effects)
-    rows: list[tuple[str, ...]] = [("linear model", *_free_run(dia.before))]
-    if extended:
-        rows.append(("extended model", *_free_run(dia.after)))
-    rows.append(("noise of the measured velocity", number(dia.after.noise_floor), ""))
-    parts: list[str] = []
-    if dia.in_sample:
-        text = (
-            "In-sample: there were too few data, or too little motion, to hold any out. Parameters were fitted to the same "
-            "samples: this flatters them."
-        )
-        parts.append(box(tag("p", text), kind="warn"))
-    else:
-        parts.append(tag("p", "Free-run simulation on ", dia.held_out, "."))
-    sizes = [run.rmse for run in (dia.before, dia.after)[: 1 + extended]]
-    parts.append(_in_units([("", f"rmse [{v}]", "fit [%]"), *rows], "rmse", [*sizes, dia.after.noise_floor], v, view))
-    if noise := noise_words(dia):
-        parts.append(tag("p", typeset(said(noise, axis))))
-    if not dia.loop_follows:
-        parts.append(box(tag("p", typeset(said(not_the_loop_words(dia), axis))), kind="warn"))
-    if extended and dia.before.rmse > 0.0:
-        parts.append(tag("p", typeset(said(fall_words(dia), axis))))
-    parts += _force(dia, view)
-    validation = next((r for r in view.runs if r.used == "held out"), None) or next(
-        (r for r in view.runs if r.held_out_from is not None), None
-    )
-    if validation is not None:
-        if validation.used == "held out":
-            parts.append(tag("h3", validation.name or "validation record"))
-        parts.append(drawn.put(charts.held_out_chart(validation, dia.after.noise_floor, "record", axis)))
-    elif view.runs and dia.validation_digests:
-        parts.append(box(tag("p", "The validation record is not at hand, so its curves are not drawn."), kind="quiet"))
-    else:
-        parts.append(needs_record(view, "The curves of what was held out need the record."))
-    if dia.left:
-        found = sorted(dia.left.items(), key=lambda item: -item[1])
-        counts = driver_counts(dia)
-        mark = "most" if counts else "closest"
-        lines: list[Row] = [
-            (said(DRIVERS.get(k, k), axis), typeset(f"{g:.0f}"), mark if k == dia.driver else "") for k, g in found
-        ]
-        parts.append(tag("h3", "What the rest depends on"))
-        verdict = "Nothing of it is significant." if dia.driver is None else typeset(left_words(dia, axis))
-        parts.append(tag("p", verdict, " BIC units gained by a free function of each; below 0 it is not worth its parameters."))
-        if dia.driver is not None and not counts:
-            text = f"Above {dia.left_needed:.0f} one counts. Where plain errors decide, the closest is what leaves least of them."
-            parts.append(tag("p", text))
-        parts.append(table(("", "BIC units", ""), [lines]))
-    return Section("gain", "Before and after", *parts)
-
-
-def _force(dia: Diagnosis, view: View) -> list[str]:
-    """The force error on the same data, and the check by the regression."""
-    axis = view.axis
-    parts: list[str] = []
-    rows = force_rows(dia, axis, view.scales)
-    if rows:
-        parts += [tag("h3", f"{word('Torque', axis)} error"), tag("p", typeset(force_words(dia, axis)))]
-        parts.append(table(rows[0], [[(row[0], *map(typeset, row[1:])) for row in rows[1:]]]))
-    both: list[Row] = [tuple(map(typeset, row)) for row in comparison_rows(dia, axis)]
-    if both:
-        parts += [tag("h3", "Check by inverse-dynamics regression"), tag("p", typeset(method_words(dia, axis)))]
-        parts.append(table(("", "diagnosis", "regression", "unit", ""), [both]))
-    return parts
 
 
 def _untested(dia: Diagnosis, view: View) -> Section:

@@ -143,7 +143,8 @@ def _friction(found: Beforehand, axis: str) -> Html:
         for k in at
     ]
     force = unit("N m", axis)
-    return table((f"speed [{velocity_unit(axis)}]", f"friction forwards [{force}]", f"backwards [{force}]"), [rows])
+    head = (f"speed [{velocity_unit(axis)}]", f"friction forwards, without the viscous part [{force}]", f"backwards [{force}]")
+    return table(head, [rows])
 
 
 def _waves(found: Beforehand, axis: str) -> Html:
