@@ -33,7 +33,7 @@ def relevance_words(dia: Diagnosis, axis: str, scales: Scales) -> str:
     begun = f"Beyond what noise leaves {it} {size}"
     noise = f"noise alone leaves {_shown(r.noise, v, scales)} of a free run"
     if r.torque_noise is not None:
-        noise += f" and {_shown(r.torque_noise, u, scales)} of the {torque}"
+        noise += f", noise and filter {_shown(r.torque_noise, u, scales)} of the {torque}"
     if asked and r.negligible:
         return f"{begun}: negligible, as the accuracy that was asked for is {' and '.join(asked)}."
     if asked:

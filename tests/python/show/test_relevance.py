@@ -89,8 +89,8 @@ def test_the_size_is_in_the_users_unit_with_si_behind() -> None:
     left = Relevance(0.1, 0.3, 0.002, 0.004)
     assert said(left) == (
         "Beyond what noise leaves it is 0.95 rpm (0.1 rad/s) rms in the velocity and 0.002 N m rms in the torque. In size that "
-        "is negligible: noise alone leaves 2.9 rpm (0.3 rad/s) of a free run and 0.004 N m of the torque. Significant means that "
-        "chance does not make it."
+        "is negligible: noise alone leaves 2.9 rpm (0.3 rad/s) of a free run, noise and filter 0.004 N m of the torque. "
+        "Significant means that chance does not make it."
     )
     assert said(Relevance(0.4, 0.3)).endswith("rms in the velocity; noise alone leaves 2.9 rpm (0.3 rad/s) of a free run.")
     assert "and nothing in the torque; noise alone leaves" in said(Relevance(0.4, 0.3, 0.0, 0.01))
@@ -101,8 +101,8 @@ def test_the_size_is_in_the_users_unit_with_si_behind() -> None:
     assert "is not met, though nothing of it is significant" in said(asked, None)
     assert said(left, None) == "" == said(None)
     assert said(Relevance(0.0, 0.3, 0.0, 0.004)) == (
-        "In size it is negligible: noise alone leaves 2.9 rpm (0.3 rad/s) of a free run and 0.004 N m of the torque, and the "
-        "model leaves no more. Significant means that chance does not make it."
+        "In size it is negligible: noise alone leaves 2.9 rpm (0.3 rad/s) of a free run, noise and filter 0.004 N m of the "
+        "torque, and the model leaves no more. Significant means that chance does not make it."
     )
 
 
