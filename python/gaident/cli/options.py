@@ -98,7 +98,9 @@ examples:
   gaident simulate run1.json run*.csv --drive drive.toml --out simulated/     one CSV per log
   gaident simulate motor.json run2.csv --kp 0.0232 --ki 1.367 --json
 """
-EFFECTS_HELP = """Lists the effects: place in the loop, parameters with units, one line of meaning."""
+EFFECTS_HELP = (
+    """Lists the effects: place in the loop, parameters with units, one line of meaning; of named ones the bounds too."""
+)
 
 DIAGNOSE_HELP = """\
 Shows what the simulation of an axis gets wrong, names the physical cause where the data allow it (dry
@@ -254,7 +256,8 @@ def parser_of(commands: Mapping[str, str]) -> argparse.ArgumentParser:
     sub = command("feedforward", "RESULT.json ", line, FEEDFORWARD_HELP, FEEDFORWARD_EXAMPLES)
     add_feedforward_options(sub)
 
-    sub = command("effects", "", "what a model can carry beyond its linear part", EFFECTS_HELP)
+    sub = command("effects", "[NAME ...] ", "what a model can carry beyond its linear part", EFFECTS_HELP)
+    sub.add_argument("names", nargs="*", metavar="NAME", help="only these effects, each with the bounds of its parameters")
     sub.add_argument("--json", action="store_true", help="print JSON instead of a table")
 
     sub = command("demo", "", "the main job, on data of its own", DEMO_HELP)

@@ -184,3 +184,14 @@ def test_demo_without_measured_data(here: Path, capsys: pytest.CaptureFixture[st
     drive = ROOT / "examples" / "drive.toml"
     assert main(["identify", "demo_two_mass.csv", "--drive", str(drive)]) == 0
     assert capsys.readouterr().out.startswith("(p,q) = (1,2)")
+
+
+def test_effects_that_are_named_come_with_their_bounds(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["effects", "stribeck friction", "backlash"]) == 0
+    out = capsys.readouterr().out
+    assert "  place: shaft, at motor or load\n  torque [N m], >= 0\n" in out and "static_torque must be at least torque" in out
+    assert out.endswith("backlash: play between motor and load; gap is its full width\n  place: coupling\n  gap [rad], >= 0\n")
+    assert main(["effects", "backlash", "--json"]) == 0
+    assert [row["name"] for row in json.loads(capsys.readouterr().out)["effects"]] == ["backlash"]
+    assert main(["effects", "backslash"]) == 2
+    assert "did you mean 'backlash'" in capsys.readouterr().err
