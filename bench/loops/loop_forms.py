@@ -36,8 +36,8 @@ from json_lines import read, work
 
 import gaident as ga
 from drive_cases import ANYWHERE, random_case
-from drive_rig import COUPLING, Noise
-from loop_cases import CURRENT_LOOP, EVERY, INDUSTRY_BITS, LOOPS, industrial_plant, loop_kind, loop_noise, loop_plant
+from drive_rig import COUPLING
+from loop_cases import EVERY, INDUSTRY_BITS, LOOPS, industrial_case, loop_kind, loop_noise, loop_plant
 
 FORMS = {
     "integration_rule", "other_gains", "command_weight", "torque_filter", "velocity_feedback_filter", "command_filter",
@@ -101,11 +101,7 @@ class Case:
             plant = loop_plant(loop, every, rng, two, kind if self.jumps else None)
             noise = loop_noise("white" if rng.integers(2) else encoder, number)
             return random_case(number, (effect,) if effect else (), kind, noise, self.torque, plant=plant)
-        plant = industrial_plant(loop, every, rng)
-        factor = float(rng.uniform(*CURRENT_LOOP)) / 1e-3
-        noise = Noise(white=0.0, encoder=2 * np.pi / 2.0 ** int(rng.integers(*self.bits)), differenced=True)
-        hidden = ("torque_lag", effect) if effect else ("torque_lag",)
-        return random_case(number, hidden, loop_kind(loop), noise, self.torque, factor, plant)
+        return industrial_case(loop, every, effect, number, self.bits, self.torque)
 
 
 def run(case: Case) -> dict[str, Any]:

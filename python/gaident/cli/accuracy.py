@@ -8,7 +8,7 @@ from dataclasses import replace
 
 from gaident.data.formats.units import Constants, factor, is_unit, known_units, of_other_axis
 from gaident.drive.drive_file import CONSTANTS, Drive
-from gaident.errors import SettingsError
+from gaident.errors import ReadError, SettingsError
 
 __all__ = ["accuracy_of"]
 
@@ -46,7 +46,10 @@ def _meant(unit: str, constants: Constants, axis: str, text: str) -> tuple[str, 
     both = all(is_unit(unit, name) for name in QUANTITIES)
     for name in QUANTITIES if of_speed or not both else reversed(QUANTITIES):
         if is_unit(unit, name) and not of_other_axis(name, unit, axis):
-            return name, factor(name, unit, constants)
+            try:
+                return name, factor(name, unit, constants)
+            except ReadError as error:
+                raise SettingsError(f"--accuracy {text!r}: {error}") from error
     listed = ", ".join(unit for name in QUANTITIES for unit in known_units(name, axis))
     raise SettingsError(
         f"--accuracy {text!r}: {unit!r} is no unit of a velocity or a torque of a {axis} axis: give one of {listed}"

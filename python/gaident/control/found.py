@@ -86,6 +86,31 @@ class FoundNumbers:
         except ControllerError:
             return None
 
+    def with_number(
+        self, name: tuple[str, str], value: float, std: float, put: Callable[[Controller, float], Controller]
+    ) -> FoundNumbers:
+        """The same with one number above 0 more, independent of the others; name: (finding, parameter); put: sets it."""
+        count, made, named = len(self.at), self.made, self.named
+        assert self.covariance is not None
+        covariance = np.zeros((count + 1, count + 1))
+        covariance[:count, :count], covariance[count, count] = self.covariance, std**2
+
+        def also(at: Vector, spread: Matrix) -> dict[str, Mapping[str, tuple[float, float]]]:
+            others = {} if named is None else dict(named(at[:count], spread[:count, :count]))
+            finding, parameter = name
+            mine = {parameter: (float(at[count]), float(np.sqrt(spread[count, count])))}
+            return {**others, finding: {**others.get(finding, {}), **mine}}
+
+        return replace(
+            self,
+            made=lambda at: put(made(at[:count]), float(at[count])),
+            at=np.append(self.at, value),
+            covariance=covariance,
+            low=np.append(np.broadcast_to(self.low, count), POLICY.negligible * value),
+            high=np.append(np.broadcast_to(self.high, count), np.inf),
+            named=also,
+        )
+
     def then(self, change: Callable[[Controller], Controller]) -> FoundNumbers:
         """The same of a controller that is changed by what is known."""
         made = self.made

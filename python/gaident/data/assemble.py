@@ -21,8 +21,8 @@ from gaident.data.signals.arrays import MINIMUM_SAMPLES
 from gaident.data.signals.conditioning import differentiate, low_pass
 from gaident.data.signals.decimation import Decimator, decimated, factor_of
 from gaident.data.signals.difference import backward_difference
-from gaident.data.signals.resampling import resampled
-from gaident.data.timeaxis import SLOW_STEP, TimeAxis
+from gaident.data.signals.resampling import interpolated, resampled
+from gaident.data.timeaxis import SLOW_STEP, TimeAxis, even_step
 from gaident.data.torque_kind import COMMANDED, HELD, MEAN, MEASURED, SMOOTH, kind_of_torque
 from gaident.data.wanted import Wanted, si_factor
 from gaident.data.winding_torque import ELECTRICAL, torque_of_winding
@@ -60,7 +60,8 @@ def assemble(table: LogTable, wanted: Wanted, stem: str) -> Record:
     said: list[str] = [*_unnamed_torque(table, wanted, named), *_known_by_name(kind, wanted)]
     held = {"torque": wanted.torque_log == HELD} if is_held(kind, wanted.torque_log) else {}
     if wanted.resample is not None:
-        dt, values = _on_even_axis(table, wanted, named, scales, counters, held)
+        dt, values, more = _on_even_axis(table, wanted, named, scales, counters, held)
+        said += more
     else:
         dt, values = _block_by_block(table, wanted, named, scales, counters, held)
     said += [*_slow_clock(table, wanted, named, dt), *_held_long(kind, wanted, named, dt)]
@@ -253,8 +254,8 @@ def _on_even_axis(
     scales: dict[str, float],
     counters: Counters,
     held: Mapping[str, bool],
-) -> tuple[float, _Values]:
-    """(dt [s], channel -> values in SI), each channel interpolated from time stamps of its own; held: see `resampled`."""
+) -> tuple[float, _Values, list[Text]]:
+    """(dt [s], channel -> values in SI, a note), each channel interpolated from time stamps of its own; held: see `resampled`."""
     assert wanted.resample is not None
     clocks = {channel: clock_of(table, wanted, column) for channel, column in named.items()}
     parts: dict[str, list[tuple[NDArray[np.float64], NDArray[np.float64]]]] = {channel: [] for channel in named}
@@ -274,7 +275,7 @@ def _on_even_axis(
     factor = factor_of(wanted.decimate)
     if factor > 1:
         even = {channel: decimated(x, factor, channel in held) for channel, x in even.items()}
-    return dt * factor, even
+    return dt * factor, even, interpolated(*min(even_step(np.diff(t)) for t, _ in whole.values()), dt)
 
 
 def channels_of(table: LogTable, wanted: Wanted) -> dict[str, Column]:

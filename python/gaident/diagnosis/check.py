@@ -47,6 +47,7 @@ from gaident.policy.table import POLICY
 from gaident.results.estimate import Estimate
 from gaident.results.fitness import Comparison, Fitness
 from gaident.results.inverse_dynamics import InverseDynamics
+from gaident.show.wording import with_std
 
 __all__ = ["Check", "checked"]
 
@@ -335,16 +336,17 @@ def _smaller_sentence(c: Comparison, own: Estimate) -> Text:
     mine, other = _both(c)
     text = (
         "{}, the inverse-dynamics regression of the same records {}: {}{:.3g} times both deviations together. Of "
-        "records that the model itself made it says {:.3g} {}, so that its filter is not the reason."
+        "records that the model itself made it says {} {}, so that its filter is not the reason."
     )
     share = 100.0 * abs(c.diagnosis.value - c.regression.value) / max(abs(c.diagnosis.value), abs(c.regression.value))
     apart = Text("") if c.diagnosis.value == 0.0 or c.regression.value == 0.0 else say("{:.2g} % apart, ", share)
-    return say(text, mine.begun(), other, apart, _deviations(c), own.value, unit_text(own.unit))
+    said = with_std(own.value, own.std)
+    return say(text, mine.begun(), other, apart, _deviations(c), said, unit_text(own.unit))
 
 
 def _both(c: Comparison) -> tuple[Text, Text]:
     """What each of the two says, in words."""
-    a, b = (say("{:.3g} +- {:.2g} {}", e.value, e.std, unit_text(e.unit)) for e in (c.diagnosis, c.regression))
+    a, b = (say("{} {}", with_std(e.value, e.std), unit_text(e.unit)) for e in (c.diagnosis, c.regression))
     name = say("{inertia}") if c.name == "inertia" else Text(c.name)
     mine = say("the diagnosis has no {}", name) if c.diagnosis.value == 0.0 else say("the {} of the diagnosis is {}", name, a)
     return mine, Text("finds none of it") if c.regression.value == 0.0 else say("says {}", b)

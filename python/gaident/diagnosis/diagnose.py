@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -15,7 +16,7 @@ from gaident.data.record import Record
 from gaident.diagnosis.blas import one_thread
 from gaident.diagnosis.controller.as_read import in_terms_of_the_log, outliers_of_the_log
 from gaident.diagnosis.controller.driving import Driving, driving_of
-from gaident.diagnosis.controller.form_findings import loop_of
+from gaident.diagnosis.controller.form_findings import Loop, loop_of
 from gaident.diagnosis.controller.joint_numbers import better_under
 from gaident.diagnosis.explain.expected import outside_of
 from gaident.diagnosis.gains import judges_selected
@@ -29,12 +30,12 @@ from gaident.diagnosis.records.arguments import (
     noise_std_of,
     records_of,
 )
-from gaident.diagnosis.unlogged.unlogged_form import in_series, leaves_noise
+from gaident.diagnosis.unlogged.unlogged_form import in_series
 from gaident.diagnosis.work import Work
 from gaident.errors import SettingsError
 from gaident.identification.identify import identify
 from gaident.identification.replay.command_timing import timed
-from gaident.identification.replay.driven_records import torque_driven
+from gaident.identification.replay.driven_records import Driven, torque_driven
 from gaident.models.drive_torque import on_lines
 from gaident.policy.table import POLICY
 from gaident.results.diagnosis import Diagnosis
@@ -139,23 +140,21 @@ def diagnose(
     with one_thread(), np.errstate(over="ignore", invalid="ignore"):
         given, lines = outliers_of_the_log(recorded, checked_controller(controller))
         asked = loop_of(given, checked_controller(controller))
-        given = timed(given, asked.controller)
-        driven = torque_driven(given, asked.controller)
-        kept = timed(outliers_of_the_log(apart, asked.controller)[0], asked.controller)
-    records = tuple(on_lines(r, driven.controller) for r in driven.records)
-    validating = tuple(on_lines(r, asked.controller) for r in torque_driven(kept, asked.controller).records) if kept else ()
-    checked(records, validating, driven.loop, identification, bootstrap, seed, progress, axis, pitch)
-    origin = {r.digest: whole for r, whole in zip((*records, *validating), (*given, *kept), strict=True)}
-    records, validating = in_order(records), in_order(validating)
+        prepared = [_Prepared.of(asked, given, apart)]
+    checked(*prepared[0].all_records, prepared[0].driven.loop, identification, bootstrap, seed, progress, axis, pitch)
     noise_std, asked_accuracy, ranges = noise_std_of(noise), accuracy_of(accuracy), expected_of(expected)
     if not isinstance(quick, bool):
         raise SettingsError(f"quick is {quick!r}: give True or False")
     with one_thread(), np.errstate(over="ignore", invalid="ignore"):
         note(0.01, "replaying the controller, and looking for its form where it does not fit")
-        driving = driving_of(records, validating, asked, driven, origin)
-        hit = {r.digest: outliers for r, outliers in zip(given, lines, strict=True)}
-        clocked = controller is not None and controller.clock is not None
-        driving = replace(driving, outliers=hit, clocked=clocked, left_open=controller is not None and bool(controller.unknown))
+        hit = {r.digest: outliers for r, outliers in zip(prepared[0].given, lines, strict=True)}
+
+        def driven_under(one: _Prepared) -> Driving:
+            clocked = controller is not None and controller.clock is not None
+            left_open = controller is not None and bool(controller.unknown)
+            return replace(one.driving(), outliers=hit, clocked=clocked, left_open=left_open)
+
+        driving = driven_under(prepared[0])
         note(0.02, "identifying the linear model")
 
         def searched(driving: Driving, most: int, idn: Identification | None = None) -> Work:
@@ -166,6 +165,26 @@ def diagnose(
                 note.identified()
             work = Work(here.records, here.validation, driving, idn, noise_std, note, axis, pitch, most)
             work.search()
+            if work.leaves_noise or driving.found is None:
+                return work
+            work.with_joint_numbers()
+            if work.driving is driving:
+                return work
+            note(0.03, "once more, with these numbers of the controller")
+            again = Work(work.records, work.validation, work.driving, idn, noise_std, note, axis, pitch, most)
+            again.search()
+            return again if _explains_more(again, work) else work
+
+        def with_rule(work: Work, most: int) -> Work:
+            """The work, or that with another rule of the integral with which it leaves noise."""
+            settled = work.leaves_noise and not in_series(work.final)
+            for rule in () if settled else work.driving.other_rules():
+                if not better_under(work.found, rule.controller, rule.found):
+                    continue
+                note(0.03, "once more, with another rule of the integral")
+                ruled = searched(work.driving.ruled(rule), most)
+                if ruled.confirms(work) or _explains_more(ruled, work):
+                    return ruled
             return work
 
         def under_best_controller(most: int, idn: Identification | None) -> Work:
@@ -178,15 +197,17 @@ def diagnose(
                     work = formed
                 else:
                     work.refused(form)
-            settled = leaves_noise(work.found.space, work.final) and not in_series(work.final)
-            for rule in () if settled else work.driving.other_rules():
-                if not better_under(work.found, rule.controller, rule.found):
-                    continue
-                note(0.03, "once more, with another rule of the integral")
-                ruled = searched(work.driving.ruled(rule), most)
-                if ruled.confirms(work) or _explains_more(ruled, work):
-                    work = ruled
-                    break
+            work = with_rule(work, most)
+            for simpler in asked.simpler:
+                prepared.append(_Prepared.of(simpler, given, apart))
+                beside = driven_under(prepared[-1])
+                linear = identify(list(beside.moved.records), bare_pi(beside.controller), seed=seed)
+                if POLICY.each_number * linear.rmse < work.idn.rmse:
+                    note(0.03, "once more, under a simpler controller")
+                    plain = with_rule(searched(beside, most, linear), most)
+                    if plain.leaves_noise and (not work.leaves_noise or _explains_more(plain, work)):
+                        work = plain
+                        break
             given_work = work
             for _ in range(POLICY.rounds):
                 other = work.other_gains(given_work)
@@ -219,8 +240,8 @@ def diagnose(
             linear_model=work.base.parameters.model(work.base.x) if own else work.idn.model,
         )
         result = driving.moved.noted(result)
-        pairs = zip((*given, *kept), (*recorded, *apart), strict=True)
-        result = in_terms_of_the_log(result, {read.digest: logged for read, logged in pairs})
+        pairs = ((one.read, (*recorded, *apart)) for one in prepared)
+        result = in_terms_of_the_log(result, {read.digest: logged for pair in pairs for read, logged in zip(*pair, strict=True)})
         if result.relevance is not None:
             velocity, torque = (asked_accuracy.get(name) for name in ("velocity", "torque"))
             wanted = replace(result.relevance, velocity_accuracy=velocity, torque_accuracy=torque)
@@ -238,8 +259,47 @@ def diagnose(
     return replace(result, seconds=time.perf_counter() - began)
 
 
+class _Prepared(NamedTuple):
+    """The records as a loop's torque drives a model; given, kept: those to fit and to validate as its controller read them."""
+
+    loop: Loop
+    given: tuple[Record, ...]
+    kept: tuple[Record, ...]
+    driven: Driven
+
+    @classmethod
+    def of(cls, asked: Loop, records: Sequence[Record], apart: Sequence[Record]) -> _Prepared:
+        given = tuple(timed(records, asked.controller))
+        kept = tuple(timed(outliers_of_the_log(apart, asked.controller)[0], asked.controller))
+        return cls(asked, given, kept, torque_driven(given, asked.controller))
+
+    @property
+    def read(self) -> tuple[Record, ...]:
+        return (*self.given, *self.kept)
+
+    @property
+    def all_records(self) -> tuple[tuple[Record, ...], tuple[Record, ...]]:
+        """(those to fit, those to validate)."""
+        controller = self.loop.controller
+        later = torque_driven(self.kept, controller).records if self.kept else ()
+        return tuple(on_lines(r, self.driven.controller) for r in self.driven.records), tuple(
+            on_lines(r, controller) for r in later
+        )
+
+    def driving(self) -> Driving:
+        records, validating = self.all_records
+        origin = {r.digest: whole for r, whole in zip((*records, *validating), self.read, strict=True)}
+        return driving_of(in_order(records), in_order(validating), self.loop, self.driven, origin)
+
+
 def _explains_more(one: Work, given: Work) -> bool:
-    """Whether a search under another controller of as many numbers leaves noise, with no more effects, and is clearly better."""
-    score, least = (work.found.space.score(work.final) for work in (one, given))
-    no_more = len(one.final.effects) <= len(given.final.effects)
-    return no_more and leaves_noise(one.found.space, one.final) and score < least - one.found.space.margin
+    """Whether a search under another controller of no more numbers leaves noise, with no more effects, and is clearly better.
+
+    Whitened errors that are noise are better than output errors, by which a model is judged where whitened ones are none.
+    """
+    if len(one.final.effects) > len(given.final.effects) or not one.leaves_noise:
+        return False
+    here, there = one.found.space, given.found.space
+    if here.whitens != there.whitens:
+        return here.whitens
+    return here.score(one.final) < there.score(given.final) - here.margin

@@ -22,6 +22,7 @@ from gaident.diagnosis.explain.alternatives import LOG_SHIFT, alike_here, altern
 from gaident.diagnosis.explain.bending import relevance_of
 from gaident.diagnosis.explain.beside import friction_beside, late_together
 from gaident.diagnosis.explain.determined import determined, not_determined
+from gaident.diagnosis.explain.ends import ends_of
 from gaident.diagnosis.explain.held_out import standing
 from gaident.diagnosis.explain.late_inside import late_inside
 from gaident.diagnosis.explain.verdict import verdict_of
@@ -43,7 +44,7 @@ from gaident.diagnosis.explain.wording import (
 from gaident.diagnosis.gains import Gains, measured_gains, with_effects
 from gaident.diagnosis.judged import Judged
 from gaident.diagnosis.library.record import findings_of_the_record
-from gaident.diagnosis.library.sides import called_of, name_of, sides_of
+from gaident.diagnosis.library.sides import called_of, name_of
 from gaident.diagnosis.library.terms import LIBRARY, in_controller
 from gaident.diagnosis.linear_part import linear_of_part
 from gaident.diagnosis.mechanics import base_shift, mechanics_of, of_no_axis, of_the_age
@@ -184,7 +185,12 @@ class Work:
     def confirms(self, given: Work) -> bool:
         """Whether a search under another form of controller leaves noise, and fewer effects, less or a better mechanism."""
         fewer = given.doubtful or len(self.final.effects) < len(given.final.effects)
-        return leaves_noise(self.found.space, self.final) and (fewer or not leaves_noise(given.found.space, given.final))
+        return self.leaves_noise and (fewer or not given.leaves_noise)
+
+    @property
+    def leaves_noise(self) -> bool:
+        """Whether the model leaves noise."""
+        return leaves_noise(self.found.space, self.final)
 
     def refused(self, form: UnloggedForm) -> None:
         """Note that another form comes closer, although a search under it does not end in noise."""
@@ -280,14 +286,11 @@ class Work:
         self.doubts = like_filters(self.data, in_series(self.final)) or late_inside(self.under, self.estimate)
         for effect in causes:
             gain, rivals = self.rivals[effect]
-            never = impossible_here(effect, {e: estimates[e] for e in causes}) | self._told_by_the_current
+            never = impossible_here(effect, {e: estimates[e] for e in causes}) | self.driving.told_by_the_current
             alternatives = self._alternatives(effect, rivals, offset, never)
             self.notes += [or_other_gains(effect)] * (effect in self.gain_doubt.rivals)
-            two = self.final.parameters.masses > 1
-            one_place = not two or any(t.resonates for t in self.final.parameters.terms)  # beside those nothing is at the load
-            steady = LIBRARY[effect].constant and any(self.data.stored)  # a torque that twists the shaft all the time
-            sides = sides_of(effect, [r.effect for r in rivals], one_place or steady)
-            said_by = evidence_of(effect, gain, alternatives, offset, sides if two else ())
+            ends = ends_of(self.found.space, self.final, effect, [r.effect for r in rivals])
+            said_by, sides = evidence_of(effect, gain, alternatives, offset, ends), ends.sides
             what = name_of(effect), estimates[effect], alternatives, gains.of(effect), gain, None, said_by, False
             findings.append(Finding(*what, LIBRARY[effect].place, sides))
         if (impossible := of_no_axis(mechanics)) is not None:
@@ -384,11 +387,6 @@ class Work:
         if self.form is not None and self.form.as_good(self.found.space.margin) and effect in in_series(self.final):
             names.append(self.form.finding.effect)
         return tuple(n for n in dict.fromkeys(map(name_of, names)) if n != name_of(effect) and n not in self.not_testable)
-
-    @property
-    def _told_by_the_current(self) -> frozenset[str]:
-        """Effects that delay the velocity, where a measured torque shows the lag of the torque; else none."""
-        return frozenset(t.name for t in LIBRARY.values() if t.late) if self.driving.lag is not None else frozenset()
 
     def _only_describes(self, effect: str, driver: str | None) -> bool:
         of_class = bool(self._equivalent_here(effect))

@@ -13,12 +13,11 @@ from gaident.axis import Text, said, say, unit, word
 from gaident.data.formats.units import factor, needed_constant
 from gaident.data.guess import Guess, guess_channels, unit_from_position, unit_from_velocity
 from gaident.data.listing import Listing
-from gaident.data.timeaxis import SLOW_STEP, even_step, stamp_unit
+from gaident.data.timeaxis import SLOW_STEP, stamp_unit
 from gaident.data.torque_kind import kind_of_torque
-from gaident.drive.draft_lines import head_of, line_of, plain, quoted
+from gaident.drive.draft_lines import head_of, line_of, plain, quoted, resampling_of
 from gaident.drive.log_content import axes_of, factor_of, gaps_of, is_linear, with_content
 from gaident.errors import ReadError
-from gaident.policy.table import POLICY
 
 __all__ = ["DriveDraft", "draft"]
 
@@ -186,8 +185,11 @@ class _Draft:
             kinds = '"commanded": by the controller; "measured": a current times a constant'
             if self.torque_is is not None:
                 lines.append(line_of(f"torque_is = {quoted(self.torque_is)}", f"as its column's name says; {kinds}"))
-            else:
+            elif self._driven:
                 lines.append(self._todo('# torque_is = "measured"', "torque_is", f"{kinds}; commanded is taken"))
+            else:
+                taken = "measured is taken, as no command is logged"
+                lines.append(self._todo('torque_is = "measured"', "torque_is", f"{kinds}; {taken}"))
         lines.append(
             line_of("# gear_ratio = 10.0", 'turns of the motor per turn of the load, with load_side = ["position"], what was')
         )
@@ -205,24 +207,14 @@ class _Draft:
             lines.append(line_of("pieces = true", f"the time has {some}: what lies around them are records of their own"))
             lines.append(line_of(f"# dt = {self.dt:.9g}", "s, between the gaps; needed for gaident experiment"))
         elif self.dt is None:
-            lines.append(self._todo(*self._resampling(), f"the time stamps are irregular: {plain(time.note if time else '')}"))
+            stamps = self.values.get(time.name) if time is not None else None
+            axis = resampling_of(np.zeros(0) if stamps is None else np.diff(stamps) * self._second())
+            lines.append(self._todo(*axis, f"the time stamps are irregular: {plain(time.note if time else '')}"))
         else:
             source = f"from the column {quoted(time.name)}" if time is not None else "as the file states"
             lines.append(line_of(f"# dt = {self.dt:.9g}", f"s, {source}; needed for logs without it, and for gaident experiment"))
         lines.append(line_of("# decimate = 10", "keep every tenth sample behind a low-pass, for very long logs"))
         return lines
-
-    def _resampling(self) -> tuple[str, str, str]:
-        """The line that puts irregular stamps on an even axis, its key, and which values are allowed."""
-        time = self.guess.time
-        stamps = self.values.get(time.name) if time is not None else None
-        steps = np.diff(stamps) * self._second() if stamps is not None else np.zeros(0)
-        usual = float(np.median(steps)) if len(steps) else 0.0
-        if not usual > 0.0:
-            return "# resample = 1e-3", "resample", "s from line to line of an even time axis, a number above 0"
-        least, most = usual / POLICY.resample_finer, usual * POLICY.resample_coarser
-        allowed = f"s from line to line of an even time axis, from {least:.3g} to {most:.3g}"
-        return f"# resample = {even_step(steps)[0]:.6g}", "resample", allowed
 
     def time(self) -> list[str]:
         """The column of the time."""
@@ -276,6 +268,11 @@ class _Draft:
         """Whether a position controller drives the axis: what it is given and what it reads are logged."""
         return {"position", "position_command"} <= self.guess.channels.keys()
 
+    @property
+    def _driven(self) -> bool:
+        """Whether a command is logged, so that a controller can be simulated."""
+        return bool({"position_command", "command"} & self.guess.channels.keys())
+
     def _either(self, *channels: str) -> str:
         """The columns of which one may be the channel, where only the user knows; "" where there are none."""
         names = dict.fromkeys(c.name for channel in channels for c in self.guess.undecided.get(channel, ()))
@@ -319,8 +316,7 @@ class _Draft:
         text = "as set in the drive"
         if "torque" in self.guess.channels:
             text += ', "unknown", or loop = "open"'
-        positioned = "position_command" in self.guess.channels
-        driven = positioned or "command" in self.guess.channels
+        positioned, driven = "position_command" in self.guess.channels, self._driven
         mark = self._todo if driven else lambda line, _, comment: line_of(line, comment)
         torque = word("torque", self.axis)
         open_loop = f"without a command the {torque} drives the model"

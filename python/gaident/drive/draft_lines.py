@@ -5,7 +5,13 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
-__all__ = ["head_of", "line_of", "plain", "quoted"]
+import numpy as np
+from numpy.typing import NDArray
+
+from gaident.data.timeaxis import even_step
+from gaident.policy.table import POLICY
+
+__all__ = ["head_of", "line_of", "plain", "quoted", "resampling_of"]
 
 _COMMENT = 26  # no decision: printed: where comments begin
 
@@ -33,3 +39,13 @@ def quoted(value: str | int) -> str:
 def plain(text: str) -> str:
     """A text without line breaks."""
     return " ".join(text.split())
+
+
+def resampling_of(steps: NDArray[np.float64]) -> tuple[str, str, str]:
+    """The line that puts irregular stamps on an even axis, its key, and which values are good; steps: between stamps [s] (n,)."""
+    usual = float(np.median(steps)) if len(steps) else 0.0
+    if not usual > 0.0:
+        return "# resample = 1e-3", "resample", "s from line to line of an even time axis, a number above 0"
+    own = f"{even_step(steps)[0]:.6g}"
+    good = f"s from line to line of an even time axis, from the log's own {own} to {usual * POLICY.resample_coarser:.3g}"
+    return f"# resample = {own}", "resample", good

@@ -5,12 +5,20 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
+import numpy as np
+from numpy.typing import NDArray
+
 from gaident.axis import Text, say
+from gaident.data.record import Record
+from gaident.errors import GaidentError
+from gaident.identification.response.averaged import measured_response
 from gaident.models.model import Model
 from gaident.results.diagnosis import Diagnosis
 from gaident.results.identification import Identification
 
-__all__ = ["doubts_of", "no_gains"]
+__all__ = ["beyond_the_records", "doubts_of", "no_gains", "shown_up_to"]
+
+Vector = NDArray[np.float64]
 
 FALSIFIED = (
     "The data contradict this model: the linear model is falsified. Gains that are designed on it may be wrong; diagnose first."
@@ -29,6 +37,7 @@ SPRUNG = (
     "the model has a zero at 0, as of an axis on a spring or one that hangs. A constant velocity then takes a {torque} that "
     "grows with the {angle}, and what the controller adds up comes to rest nowhere, whatever its gains. The given ones stay."
 )
+HALF = 0.5  # no decision: a formula: an octave below a frequency, and the most of its points
 AT_ZERO = 1e-9  # no decision: rounding: of the fastest pole, a zero that is at 0
 
 
@@ -50,3 +59,32 @@ def no_gains(models: Sequence[Model]) -> Text:
     slow = [min((z.real for z in m.mechanism.zeros if z.imag == 0.0), key=abs, default=math.inf) for m in models]
     sprung = abs(slow[0]) <= AT_ZERO * fastest or (min(slow) < 0.0 < max(slow) < math.inf)
     return say(NO_GAINS, say(SPRUNG if sprung else STAY))
+
+
+def shown_up_to(records: Sequence[Record]) -> float | None:
+    """The highest frequency [Hz] that records show, by the coherence of torque and velocity; None: none is known.
+
+    Most points of the octave below it are more coherent than by chance.
+    """
+    found = []
+    for rec in records:
+        try:
+            measured = measured_response(rec)
+        except GaidentError:
+            continue
+        f, sure = measured.frequency, measured.coherence > measured.threshold
+        ends = [hertz for hertz in f[sure] if np.mean(sure[(f >= HALF * hertz) & (f <= hertz)]) > HALF]
+        found += ends[-1:]
+    return float(max(found)) if found else None
+
+
+def beyond_the_records(records: Sequence[Record], frequencies: Vector, loop: NDArray[np.complex128]) -> tuple[Text, ...]:
+    """A doubt about a broken loop (n,) over frequencies (n,) [Hz] whose size is 1 where the records do not show the drive."""
+    shown, large = shown_up_to(records), frequencies[np.abs(loop) >= 1.0]
+    if shown is None or not len(large) or large[-1] <= shown:
+        return ()
+    text = (
+        "The size of the proposed loop is 1 up to {:.3g} Hz, but these records show the drive up to {:.3g} Hz only: another "
+        "resonance or a delay above that would not have shown. Raise the gains in steps, or log a motion with faster parts first."
+    )
+    return (say(text, float(large[-1]), shown),)

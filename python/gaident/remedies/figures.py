@@ -72,6 +72,11 @@ class Judge:
             position_gain_margin=position[1],
         )
 
+    def loop(self, cascade: Cascade) -> tuple[Vector, NDArray[np.complex128]]:
+        """(frequencies [Hz], the velocity loop of the identified drive at these, broken at the controller's output)."""
+        loops = Loops(self.plants, cascade, self.responses)
+        return loops.responses.omega[0] / (2.0 * np.pi), loops.L[0]
+
     def margins(self, cascade: Cascade) -> tuple[Vector, Vector]:
         """Phase [deg] and gain margin [dB] of the velocity loop around each drive (S,); below 0 where it is not stable."""
         with np.errstate(over="ignore", invalid="ignore", divide="ignore"):

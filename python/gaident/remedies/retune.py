@@ -21,7 +21,7 @@ from gaident.errors import SettingsError
 from gaident.models.effects_linear import LATE
 from gaident.models.model import Model
 from gaident.policy.table import POLICY
-from gaident.remedies.doubts import doubts_of, no_gains
+from gaident.remedies.doubts import beyond_the_records, doubts_of, no_gains
 from gaident.remedies.draws import age_of, drawn_models
 from gaident.remedies.figures import Judge
 from gaident.remedies.loops import Loops, frequencies_of
@@ -162,7 +162,7 @@ def retune(
         given=given,
         before=judge.figures(cascade_of(given)),
         after=after,
-        doubts=doubts_of(result),
+        doubts=(*doubts_of(result), *beyond_the_records(result.records, *judge.loop(proposal))),
         phase_margin=asked.phase_margin,
         gain_margin=asked.gain_margin,
         torque_limit=asked.torque_limit,

@@ -31,6 +31,8 @@ from gaident.show.report.views import Mended, Remedies
 __all__ = ["remedies_of"]
 
 NO_LOOP = say("no controller is known, so that there is no loop")
+NO_CONTROLLER = say("no controller is known")
+NOT_ON_THIS = say("what is said above stands against this model")
 NO_COMMAND = say("the record has no command that the loop follows")
 RUNS_AWAY = say("the simulated loop runs away on this record")
 NOT_THE_LOOP = say("the logged {torque} does not follow from the controller, so that the simulated loop is not the drive's")
@@ -44,6 +46,10 @@ def remedies_of(result: Diagnosis, records: Sequence[Record]) -> Remedies | None
     dia = replace(result, records=tuple(records))
     found = Remedies(doubts=doubts_of(dia))
     try:
+        if found.doubts:
+            raise GaidentError(NOT_ON_THIS)
+        if dia.controller is None:
+            raise GaidentError(NO_CONTROLLER)
         tuned = retune(dia, filters=isinstance(dia.controller, Cascade))
         found = replace(found, retuning=tuned, loops=loop_curves(tuned))
     except GaidentError as error:

@@ -169,8 +169,9 @@ def missing_reversals(velocity: Vector, dhat: Vector, torque: Vector, dt: float,
         top.append(Trace(ms, mean, label, roles[name], width=1.8, dash=dash))
         low.append(Trace(ms, w, "", roles[name], dash=dash, width=1.5))
     text = (
-        "The average reversal, the new direction positive. Dry friction jumps at 0; backlash leaves a spike that comes later the "
-        "slower the reversal; presliding friction changes gradually."
+        "The average reversal, the new direction positive. Dry friction jumps at 0, as steeply as the acceleration shows it; "
+        "backlash leaves a spike that comes later the slower the reversal; presliding friction changes gradually, over a path "
+        "and not over a time. A wave behind it is a shaft that rings."
     )
     upright = (Mark(0.0, ""),) if top else ()
     panels = (

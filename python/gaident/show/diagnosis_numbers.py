@@ -207,10 +207,11 @@ def spectrum(x: Vector, dt: float, segments: int = 8) -> Spectrum:
     return Spectrum(f, density[1:])
 
 
-def over_period(position: Vector, torque: Vector, velocity: Vector, period: float, bins: int = 48) -> Binned:
+def over_period(position: Vector, torque: Vector, velocity: Vector, period: float, bins: int = 48, direction: int = 0) -> Binned:
     """Mean of the torque per bin of the position within `period`, while the axis moves; x from 0 to period.
 
     What depends on the velocity alone is taken out first, as in `order_lines`: what is left belongs to the place.
+    direction: 1 or -1, samples of motion that way alone; 0, all.
     """
     w = _slow(velocity)
     moving = _moving(w)
@@ -218,6 +219,9 @@ def over_period(position: Vector, torque: Vector, velocity: Vector, period: floa
         return Binned(np.zeros(0), np.zeros(0), np.zeros(0), np.zeros(0, dtype=np.int64))
     d = _without_velocity(torque[moving], w[moving])
     place = np.mod(position[moving] - (0.0 if period == math.tau else float(position.min())), period)
+    if direction:
+        there = direction * w[moving] > 0.0
+        d, place = d[there], place[there]
     return _binned(np.minimum((place / period * bins).astype(int), bins - 1), place, d, bins)
 
 

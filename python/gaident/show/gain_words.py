@@ -153,6 +153,8 @@ def force_words(dia: Diagnosis, axis: str) -> str:
     text = say(
         "The " + which + " minus the {torque} that the model needs for the measured motion; samples at standstill are left out."
     )
+    if dia.model.effects and dia.before.force_error is None and dia.after.force_error is not None:
+        text = say("{} The mechanism without effects diverges: without them what swings in it needs ever more.", text)
     if growth := _force_growth_words(dia):
         text = say("{} {}", text, growth)
     if dia.force_reason:

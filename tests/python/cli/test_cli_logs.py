@@ -294,10 +294,10 @@ def test_init_says_which_steps_an_even_axis_may_have(here: Path, capsys: pytest.
     lines = (f"{t},{np.sin(1e-3 * t)},{np.cos(1e-3 * t)}" for t in stamps)
     Path("jitter.csv").write_text("\n".join(["time [ms],velocity [rad/s],torque [Nm]", *lines]))
     assert main(["init", "jitter.csv", "--out", "jitter.toml"]) == 0
-    said = "resample: s from line to line of an even time axis, from 0.0001 to 0.015; the time stamps are irregular: "
-    assert said in capsys.readouterr().out
+    offered = "s from line to line of an even time axis, from the log's own 0.011 to 0.015;"
+    assert f"resample: {offered} the time stamps are irregular: " in capsys.readouterr().out
     text = Path("jitter.toml").read_text()
-    assert "\n# resample = 0.011        # FILL IN: s from line to line of an even time axis, from 0.0001 to 0.015;" in text
+    assert f"\n# resample = 0.011        # FILL IN: {offered}" in text
     from gaident.cli import COMMANDS
     from gaident.cli.drive import drive_of
     from gaident.cli.options import parser_of
@@ -307,9 +307,21 @@ def test_init_says_which_steps_an_even_axis_may_have(here: Path, capsys: pytest.
         asked = drive_of(parser_of(COMMANDS).parse_args(["identify", "jitter.csv", "--drive", "even.toml", "--loop", "open"]))
         if allowed:
             assert asked.read("jitter.csv").dt == step
+            (note, *_) = asked.read("jitter.csv").notes
+            assert note == f"The log's lines are not evenly apart; they were interpolated to every {1e3 * step:g} ms."
         else:
             with pytest.raises(ga.GaidentError, match="resample"):
                 asked.read("jitter.csv")
+
+
+def test_lines_between_those_of_a_log_are_said_to_show_nothing(here: Path) -> None:
+    times = 1e-2 * np.arange(400)
+    lines = (f"{t:.2f},{np.sin(t)},{np.cos(t)}" for t in times)
+    Path("even.csv").write_text("\n".join(["time [s],velocity [rad/s],torque [Nm]", *lines]))
+    columns = {"time": "time [s]", "velocity": "velocity [rad/s]", "torque": "torque [Nm]"}
+    finer, same = (ga.read("even.csv", columns, resample=step).notes for step in (2e-3, 1e-2))
+    assert finer[0].startswith("The log's lines, 10 ms apart, were interpolated to every 2 ms: between them nothing is known")
+    assert finer[0].endswith("Give resample = 0.01 in its place.") and not any("interpolated" in note for note in same)
 
 
 def test_experiment_writes_the_command_of_a_first_record(here: Path, capsys: pytest.CaptureFixture[str]) -> None:

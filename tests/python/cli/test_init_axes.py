@@ -135,6 +135,7 @@ def test_without_a_command_the_torque_drives_the_model(run: ga.Record) -> None:
     assert re.search(r'^loop = "open" ', text, re.MULTILINE) and re.search(r'^position = "Grad" ', text, re.MULTILINE)
     assert re.search(r'^# voltage = "Spannung \[V\]"', text, re.MULTILINE)
     assert "# its name says torque or current, its unit is one of torque or current" in text
+    assert re.search('^torque_is = "measured" .*FILL IN: .*; measured is taken, as no command is logged$', text, re.MULTILINE)
     filled("drive.toml", torque_constant="0.06", torque_is='"measured"')
     assert main(["identify", "motor.csv", "--drive", "drive.toml", "--quiet"]) == 0
     offered = re.sub(r"^# voltage", "voltage", re.sub(r"^torque = ", "current = ", text, flags=re.MULTILINE), flags=re.MULTILINE)

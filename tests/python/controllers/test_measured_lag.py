@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 import gaident as ga
-from drive_rig import Plant, run_drive, skip_without_library
+from drive_rig import Noise, Plant, log_of, run_drive, skip_without_library
 from gaident.diagnosis.controller.measured_lag import commanded, lag_shown
+from gaident.diagnosis.controller.other_form import behind_a_lag
 
 T = 0.5e-3
 PI = ga.PI(0.05, 2.0)
@@ -108,3 +109,35 @@ def test_a_lag_of_the_measured_current_is_not_said_to_be_other_gains() -> None:
     assert dia.mechanics["inertia"].value == pytest.approx(AXIS.J, rel=0.005)
     assert any("behind a lag of 0.3" in note or "behind a lag of 0.29" in note for note in dia.notes), dia.notes
     assert "torque_lag" not in dia.not_testable and dia.verdict == "explained"
+
+
+CASCADE = ga.Cascade(ga.PI(0.05, 2.0, rule="backward"), period=T / 4)
+
+
+def slow_record(lag: float, noise: float, seed: int = 5) -> ga.Record:
+    """Every fourth sample of a controller: the motion, and the torque of the motor behind a lag that was not given."""
+    skip_without_library()
+    filters = (ga.LowPass(lag),) if lag else ()
+    plant = Plant(J=1e-3, D=2e-3, kp=0.05, ki=2.0, dt=T, cascade=ga.Cascade(CASCADE.velocity, T / 4, torque_filters=filters))
+    levels = np.array([0.0, 30.0, 60.0, 12.0, -24.0, -60.0, -18.0, 6.0, 42.0, 0.0, 3.0, -3.0, 0.0])
+    before, ramp = np.append(0.0, levels[:-1]), 0.125 * np.arange(800)
+    ramps = np.concatenate([a + np.clip(b - a, -ramp, ramp) for a, b in zip(before, levels, strict=True)])
+    log = log_of(plant, ramps, {"coulomb_friction": {"torque": 0.1}}, Noise(white=0.0, encoder=2 * np.pi / 2**20), seed)
+    assert log.torque is not None
+    torque = log.torque + noise * np.random.default_rng(seed).standard_normal(len(log))
+    return log.with_channels(torque=torque, torque_is="measured")
+
+
+@pytest.mark.parametrize("seed", [1, 2])
+def test_a_measured_torque_of_a_slow_log_lags_by_a_low_pass(seed: int) -> None:
+    form = behind_a_lag([slow_record(0.8e-3, 0.005, seed)], [], CASCADE)
+    assert form is not None and [f.effect for f in form.findings] == ["torque_filter"]
+    found = form.findings[0].parameters["time_constant"]
+    assert abs(found.value - 0.8e-3) < 3.0 * found.std < 0.3 * found.value
+    assert form.notes[0].startswith("The measured torque lags behind what the controller asks for, by a low pass of 0.")
+
+
+@pytest.mark.parametrize("seed", [1, 2])
+def test_a_noise_of_the_measured_torque_is_no_lag_and_a_commanded_one_has_none(seed: int) -> None:
+    assert behind_a_lag([slow_record(0.0, 0.005, seed)], [], CASCADE) is None
+    assert behind_a_lag([slow_record(0.8e-3, 0.005, seed).with_channels(torque_is="commanded")], [], CASCADE) is None

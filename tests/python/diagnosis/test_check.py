@@ -18,6 +18,7 @@ from gaident.estimation.dataset import DataSet
 from gaident.estimation.regression.force_error import FilteredRecords
 from gaident.results.diagnosis import Fitness
 from gaident.results.fitness import Comparison
+from gaident.show.wording import with_std
 
 skip_without_library()
 
@@ -111,14 +112,20 @@ def test_a_wrong_inertia_is_contradicted_with_both_numbers() -> None:
     check = check_of(record(coulomb_friction=FRICTION), inertia=9e-4, coulomb_friction=FRICTION)
     (note,) = check.notes
     assert rows(check)["inertia"].differs and not rows(check)["dry friction"].differs
-    assert "the inertia of the diagnosis is 0.0009 +- 9e-06 kg m^2" in note and "says 0.0003" in note
+    by_regression = rows(check)["inertia"].regression
+    assert "the inertia of the diagnosis is (9.000 +- 0.090)e-04 kg m^2" in note
+    assert f"says {with_std(by_regression.value, by_regression.std)} kg m^2" in note
+    assert by_regression.value == pytest.approx(3e-4, rel=0.01)
     assert "Likely: a delay between the channels" in note and "the regression leaves less of the torque" in note
 
 
 def test_a_friction_that_the_diagnosis_has_not_is_contradicted() -> None:
     check = check_of(record(coulomb_friction=FRICTION))
     (note,) = check.notes
-    assert "the diagnosis has no dry friction" in note and "says 0.05" in note
+    by_regression = rows(check)["dry friction"].regression
+    assert "the diagnosis has no dry friction" in note
+    assert f"says {with_std(by_regression.value, by_regression.std)} N m" in note
+    assert by_regression.value == pytest.approx(0.05, rel=0.01)
 
 
 def test_gravity_that_the_diagnosis_has_and_the_motion_has_not_is_contradicted() -> None:
@@ -168,10 +175,10 @@ def test_a_small_difference_is_said_where_the_regression_of_a_right_model_has_it
     assert abs(c.diagnosis.value - c.regression.value) > 3.0 * np.hypot(c.diagnosis.std, c.regression.std) and right.notes == ()
     (note,) = wrong.notes
     assert not any(c.differs for c in wrong.comparisons)
-    assert note.startswith("The inertia of the diagnosis is 0.000309 +- 6.2e-07 kg m^2, the inverse-dynamics regression")
+    assert note.startswith("The inertia of the diagnosis is (3.0900 +- 0.0062)e-04 kg m^2, the inverse-dynamics regression")
     assert "times both deviations" in note and re.search(r"2\.\d % apart", note)
-    assert re.search(r"made it says 0\.0003(09|1) kg m\^2", note)
-    assert said(note, "linear").startswith("The mass of the diagnosis is 0.000309 +- 6.2e-07 kg, ")
+    assert re.search(r"made it says \(3\.09\d\d \+- 0\.00\d\d\)e-04 kg m\^2", note)
+    assert said(note, "linear").startswith("The mass of the diagnosis is (3.0900 +- 0.0062)e-04 kg, ")
     behind = check_of(rec, inertia=3.09e-4, share=2e-3, coulomb_friction=FRICTION, torque_dead_band={"width": 1e-4})
     assert behind.notes == ()
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import zlib
 from collections.abc import Callable
 from dataclasses import replace
 
@@ -9,7 +10,7 @@ import numpy as np
 from scipy.linalg import expm
 
 import gaident as ga
-from drive_cases import EFFECTS, LATER, RAMPS, command_for, level_command, random_plant, stable
+from drive_cases import EFFECTS, LATER, RAMPS, Truth, command_for, level_command, random_case, random_plant, stable
 from drive_rig import Array, Noise, Plant, RanAwayError, between_lines, run_drive
 
 __all__ = [
@@ -19,6 +20,7 @@ __all__ = [
     "DECAY",
     "PERIOD",
     "SCHEMES",
+    "industrial_case",
     "industrial_plant",
     "jump_levels",
     "jump_log",
@@ -209,6 +211,20 @@ def industrial_plant(loop: str, every: int, rng: np.random.Generator) -> Plant:
         except RanAwayError:
             continue
     raise RuntimeError(f"no stable drive found in the loop {loop!r}")
+
+
+def industrial_case(
+    loop: str, every: int, effect: str, number: int, bits: tuple[int, int] = INDUSTRY_BITS, torque: bool = True
+) -> tuple[ga.Record, ga.Record, ga.Cascade, Truth]:
+    """(record, another one for validation, controller, truth) of an industrial drive with a current loop."""
+    rng = np.random.default_rng([number, zlib.crc32(f"{loop} {every} {effect}".encode())])
+    plant = industrial_plant(loop, every, rng)
+    factor = float(rng.uniform(*CURRENT_LOOP)) / 1e-3
+    noise = Noise(white=0.0, encoder=2 * np.pi / 2.0 ** int(rng.integers(*bits)), differenced=True)
+    hidden = ("torque_lag", effect) if effect else ("torque_lag",)
+    record, validation, controller, truth = random_case(number, hidden, loop_kind(loop), noise, torque, factor, plant)
+    assert isinstance(controller, ga.Cascade)
+    return record, validation, controller, truth
 
 
 def jump_levels(every: int, seed: int, on_lines: bool = False) -> Array:

@@ -8,10 +8,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gaident.arguments import arg
+from gaident.axis import Text, say
 from gaident.errors import ReadError
 from gaident.policy.table import POLICY
 
-__all__ = ["held_means", "resampled"]
+__all__ = ["held_means", "interpolated", "resampled"]
+
+OWN_STEP = 0.8  # no decision: what is said is decided here, and nothing that is found; of a log's own step
+MS = 1e3  # no decision: a unit: in a second
 
 
 def resampled(
@@ -71,6 +75,21 @@ def resampled(
         return held_means(ends, t - start, x) if held.get(name, False) or (name in held and fast) else np.interp(axis, t, x)
 
     return {name: even(name, t, x) for name, (t, x) in logged.items()}
+
+
+def interpolated(step: float, jitters: bool, dt: float) -> list[Text]:
+    """What is said of a log whose lines are so far apart [s], put on an axis of steps dt [s].
+
+    jitters: whether many of its steps differ.
+    """
+    if dt < OWN_STEP * step:
+        text = (
+            "The log's lines, {:.4g} ms apart, were interpolated to every {:.4g} ms: between them nothing is known, what is fast "
+            "is drawn straight, and deviations count lines that are none. Give resample = {:.4g} in its place."
+        )
+        return [say(text, MS * step, MS * dt, step)]
+    text = "The log's lines are not evenly apart; they were interpolated to every {:.4g} ms."
+    return [say(text, MS * dt)] if jitters else []
 
 
 def held_means(ends: NDArray[np.float64], t: NDArray[np.float64], x: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -19,7 +19,7 @@ from gaident.data.record import Record
 from gaident.data.signals.lattice import digits_step, lattice_step
 from gaident.diagnosis.controller.slow_forms import run_error
 from gaident.diagnosis.records.hygiene import cleaned, outliers
-from gaident.identification.logged_stretches import log_of
+from gaident.identification.logged_stretches import log_of, plateau_of
 from gaident.identification.logged_torque import tells_of_controller
 from gaident.models.drive_torque import as_differenced
 from gaident.models.starts import noise_std
@@ -31,6 +31,8 @@ __all__ = ["as_read", "in_terms_of_the_log", "outliers_of_the_log"]
 Lines = NDArray[np.intp]
 Vector = NDArray[np.float64]
 
+AROUND = np.arange(-1, 2)  # no decision: a formula: a line's velocity is in the torques from the line before to the one behind
+TINY = 1e-300  # no decision: no division by 0
 SPEED_STEP = 1e-6  # no decision: the step of a difference, of the highest speed
 
 
@@ -67,20 +69,33 @@ def _of_the_log(rec: Record, controller: Controller | None) -> tuple[Record, Lin
     none = np.zeros(0, dtype=np.intp)
     if controller is None or controller.unknown or controller.loop != "sampled" or not tells_of_controller(rec, controller):
         return rec, none
-    lines, cascade = outliers(rec.velocity), cascade_of(controller)
+    lines, cascade = _unlimited_lines(rec, outliers(rec.velocity)), cascade_of(controller)
     if not len(lines):
         return rec, none
-    interpolated = cleaned(rec, lines)
-    answered = _answered(interpolated, lines, cascade).velocity[lines]
-    lines = lines[np.abs(answered - interpolated.velocity[lines]) < np.abs(answered - rec.velocity[lines])]
+    while len(lines):
+        interpolated = cleaned(rec, lines)
+        without, spread = _answered(interpolated, lines, cascade)
+        answered = without.velocity[lines]
+        off = np.abs(answered - rec.velocity[lines])
+        stays = (np.abs(answered - interpolated.velocity[lines]) < off) & (off > POLICY.check_deviations * spread)
+        if stays.all():
+            break
+        lines = lines[stays]
     if not len(lines):
         return rec, none
-    without = _answered(cleaned(rec, lines), lines, cascade)
     return (without, lines) if run_error([without], cascade) < run_error([rec], cascade) else (rec, none)
 
 
-def _answered(rec: Record, lines: Lines, cascade: Cascade) -> Record:
-    """The record with the velocities at these lines [rad/s] that the logged torque answers, by least squares.
+def _unlimited_lines(rec: Record, lines: Lines) -> Lines:
+    """Those of the lines around which the torque is not at its plateau: a torque at a limit answers no velocity."""
+    assert rec.torque is not None
+    size = np.abs(rec.torque)
+    limited = np.flatnonzero(size >= POLICY.at_limit * plateau_of(size))
+    return lines[~np.isin(lines[:, None] + AROUND, limited).any(axis=1)]
+
+
+def _answered(rec: Record, lines: Lines, cascade: Cascade) -> tuple[Record, Vector]:
+    """(the record with the velocities at these lines that the logged torque answers, their deviations) [rad/s], by least squares.
 
         torque - made(w) = sum over lines k of x_k d made/d w_k,   w_k + x_k
 
@@ -95,7 +110,9 @@ def _answered(rec: Record, lines: Lines, cascade: Cascade) -> Record:
     before, step = made(w), max(noise_std(w), SPEED_STEP * float(np.abs(w).max()))
     columns = np.array([made(w + step * (np.arange(len(w)) == k)) - before for k in lines]).T / step
     assert rec.torque is not None
-    x, *_ = np.linalg.lstsq(np.diff(columns, axis=0), np.diff(rec.torque - before), rcond=None)
+    slopes, wanted = np.diff(columns, axis=0), np.diff(rec.torque - before)
+    x, *_ = np.linalg.lstsq(slopes, wanted, rcond=None)
+    spread = np.std(wanted - slopes @ x) / np.maximum(np.linalg.norm(slopes, axis=0), TINY)
     moved = w.copy()
     moved[lines] += x
     # The encoder, and the log, round these velocities as they round the others.
@@ -106,7 +123,7 @@ def _answered(rec: Record, lines: Lines, cascade: Cascade) -> Record:
         rounded = step * np.round(moved[lines] / step)
         if np.all(np.abs(rounded - moved[lines]) < reach * step):
             moved[lines] = rounded
-    return rec.with_channels(velocity=moved)
+    return rec.with_channels(velocity=moved), spread
 
 
 def in_terms_of_the_log(result: Diagnosis, logged: Mapping[str, Record]) -> Diagnosis:

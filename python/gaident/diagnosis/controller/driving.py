@@ -20,8 +20,9 @@ from gaident.diagnosis.controller.form_findings import Loop, driver_of
 from gaident.diagnosis.controller.limit_not_given import by_a_limit
 from gaident.diagnosis.controller.log_shift import Aligned, aligned
 from gaident.diagnosis.controller.measured_lag import Lag, commanded, lag_shown
-from gaident.diagnosis.controller.other_form import other_form, other_scheme
+from gaident.diagnosis.controller.other_form import behind_a_lag, other_form, other_scheme
 from gaident.diagnosis.controller.wrong_number import OtherRule, closer_form, other_rules, with_findings, wrong_numbers
+from gaident.diagnosis.library.terms import LIBRARY
 from gaident.diagnosis.unlogged.other_gains import OTHER_GAINS, OtherGains
 from gaident.diagnosis.unlogged.unlogged_form import UnloggedForm
 from gaident.identification.logged_torque import comparable, corrected, not_followed
@@ -126,6 +127,11 @@ class Driving:
         return self.moved.records, self.moved.validation
 
     @property
+    def told_by_the_current(self) -> frozenset[str]:
+        """Effects that delay the velocity, where a measured torque shows the lag of the torque; else none."""
+        return frozenset(t.name for t in LIBRARY.values() if t.late) if self.lag is not None else frozenset()
+
+    @property
     def regained_by(self) -> int:
         """How many gains are not the given ones."""
         return sum(len(f.parameters) for f in self.findings if f.effect == OTHER_GAINS)
@@ -187,6 +193,12 @@ def driving_of(
                 found = other.found
                 records, validation, origin = _again(records, validation, origin, partial(driven_by, controller=controller))
                 moved = aligned(records, validation, None, True)
+    if form is None and pi is None and driven.slower and not limited and not asked.findings and not doubts:
+        assert controller is not None
+        later = [origin.get(r.digest, r) for r in validation]
+        form = behind_a_lag([origin.get(r.digest, r) for r in records], later, controller)
+        if form is not None:
+            form = replace(form, findings=(*findings, *form.findings), estimates={**numbers, **form.estimates})
     if form is not None:
         controller, pi, notes, doubts = form.controller, None, (*notes, *form.notes), ()
         findings, numbers, found = form.findings, form.estimates, form.found

@@ -17,7 +17,7 @@ from gaident.data.record import Record
 from gaident.diagnosis.controller.forms import Shown, form_shown
 from gaident.diagnosis.controller.limit_not_given import left_by_a_limit
 from gaident.diagnosis.controller.period_shown import FASTER, Period, period_shown
-from gaident.diagnosis.controller.slow_forms import run_error
+from gaident.diagnosis.controller.slow_forms import follow, run_error
 from gaident.diagnosis.library.settings import ANTI_WINDUP, OF_SETTING
 from gaident.identification.controller_numbers import Numbers, with_estimates
 from gaident.identification.replay.command_timing import timed
@@ -89,6 +89,7 @@ class Loop:
     """The controller that a diagnosis works with: the given one, with its numbers, or the one that a slower log shows.
 
     period_notes: on a sample time of it that was not given. found: its numbers that were not given, or differ.
+    simpler: the given one, or one that lacks a part of the form, from which a slow log's torque follows too, if not as closely.
     """
 
     controller: Controller | None
@@ -98,6 +99,7 @@ class Loop:
     estimates: Mapping[str, Estimate] = field(default_factory=dict)
     period_notes: tuple[Text, ...] = ()
     found: FoundNumbers | None = None
+    simpler: tuple[Loop, ...] = ()
 
 
 def loop_of(records: Sequence[Record], given: Controller | None) -> Loop:
@@ -167,6 +169,13 @@ def _loop_of(records: Sequence[Record], given: Controller | None) -> Loop:
     shown = form_shown([plain_of(r) for r in records], pi, tuple(unknown[n] for n in numbers.estimates if n in unknown), every)
     if shown is None or (not numbers.estimates and left_by_a_limit(records, Cascade(pi, dt / every)) < shown.rms):
         return replace(as_given, numbers=numbers.trusted())  # or a single limit, which the simulated loop shows, explains more
+    formed = [_shown_loop(one, numbers, records) for one in (shown, *shown.simpler)]
+    trusted = replace(as_given, numbers=numbers.trusted())
+    simpler = [trusted] if follow([plain_of(r) for r in records], Cascade(pi, dt / every)) else []
+    return replace(formed[0], simpler=(*simpler, *formed[1:]))
+
+
+def _shown_loop(shown: Shown, numbers: Numbers, records: Sequence[Record]) -> Loop:
     estimates = {f"velocity.{name}": e for name, e in _estimates(shown.estimated).items()}
     known = replace(numbers, doubt="")
     return Loop(shown.controller, known, findings_of(shown), notes_of(shown, records), estimates, found=shown.found)

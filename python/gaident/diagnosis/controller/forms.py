@@ -18,7 +18,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from gaident.control.cascade import Cascade
+from gaident.control.cascade import Cascade, cascade_of
+from gaident.control.controller import Controller
 from gaident.control.found import FoundNumbers
 from gaident.control.pi import PI
 from gaident.data.record import Record
@@ -45,7 +46,7 @@ from gaident.diagnosis.controller.form_comparison import (
     shape_of,
 )
 from gaident.diagnosis.controller.form_regression import Law, law_of, quiet_law
-from gaident.diagnosis.controller.slow_forms import follow, limited, run_error, too_fast
+from gaident.diagnosis.controller.slow_forms import Limited, follow, limited, run_error, too_fast
 from gaident.diagnosis.library.settings import ANTI_WINDUP, OF_SETTING
 from gaident.identification.replay.causes import white_noise
 from gaident.identification.replay.command_timing import timed
@@ -71,6 +72,7 @@ class Shown:
     starts      the highest integral before a record's begin [N m]; 0: none
     estimated   gains that were not given -> (value, standard deviation)
     exact       the torques follow to the rounding, at every sample
+    simpler     of a slow log: the controllers without one of the names, from which the torques follow too, jumps on the lines
     found       the controller with its numbers, and how far they may be off together
     """
 
@@ -84,6 +86,7 @@ class Shown:
     estimated: dict[str, tuple[float, float]]
     found: FoundNumbers
     exact: bool = False
+    simpler: tuple[Shown, ...] = ()
 
 
 def form_shown(
@@ -127,8 +130,8 @@ def _form_of(
         if unsure is not None:
             told = _told(records, given, compared(law, given, floor, unknown, unsure))
             if told is not None:
-                return _with_limit(told.records, given, told.candidates, told.fitted)
-        return _shown_slowly(records, given, candidates, following)
+                return _with_simpler(_with_limit(told.records, given, told.candidates, told.fitted), records, given, candidates)
+        return _with_simpler(_shown_slowly(records, given, candidates, following), records, given, candidates)
     shown = _shown(records, law, given, candidates) if candidates[0].names else None
     return shown or _shown_quietly(records, law, given, floor, unknown)
 
@@ -234,6 +237,27 @@ def _shown_slowly(
     return None
 
 
+def _with_simpler(shown: Shown | None, records: Sequence[Record], given: PI, candidates: Sequence[FormCandidate]) -> Shown | None:
+    """The same beside the controllers that lack one of its names, of those that a regression shows where no limit acts.
+
+    What a log lost between its lines looks like a number of the controller, too: after each jump of the command the velocity
+    rings, the integral of what is drawn between the lines is off in proportion to the jump, and so is that of a command weight.
+    An integrator that is held at the limit is simpler than one that is set back, which has a time.
+    """
+    if shown is None:
+        return None
+    found: list[Shown] = []
+    names = {name for c in candidates for name in c.names} & {*shown.numbers}
+    ways = [(names - {name}, False) for name in sorted(names)]
+    ways += [(names, True)] * (shown.controller.velocity.tracking_time is not None)
+    for kept, held in ways:
+        best = next((c for c in candidates if {*c.names} <= kept), None)
+        one = best and _with_limit(records, given, _first(best, candidates), fitted_form(best, given), held=held)
+        if one and follow(records, one.controller) and all(one.controller != other.controller for other in found):
+            found.append(one)
+    return replace(shown, simpler=tuple(found))
+
+
 class _Told(NamedTuple):
     """Records whose torque tells, with the first of the candidates, when their command jumped; its numbers, see `fitted_form`."""
 
@@ -282,15 +306,20 @@ def _with_limit(
     candidates: Sequence[FormCandidate],
     fitted: Fitted,
     part: float = POLICY.better_reason,
+    held: bool = False,
 ) -> Shown | None:
     """A form that was shown where no limit acts, and the limit; None where there is neither, or the whole torque fits no better.
 
     part: of the given controller's rms error over the whole torque, the largest share that may be left.
     In a slower log, whose errors are no noise, it is also at most `each_number`, and the error at most that of measured noise.
+    held: whether the integrator is held where it comes closer if it is set back.
     """
     best, (numbers, filters, cov) = candidates[0], fitted
     law = best.law
     at_limit = limited(records, replace(controller_of(best, numbers, filters, given, law.period), period=law.period))
+    if held and at_limit.controller.velocity.tracking_time is not None:
+        velocity = replace(at_limit.controller.velocity, anti_windup="hold", tracking_time=None)
+        at_limit = replace(at_limit, controller=replace(at_limit.controller, velocity=velocity), time_std=0.0)
     if not best.names and not at_limit.gain and (law.lost is None or not best.form.unknown):
         return None
     plain = law.whole(given, period=law.period)
@@ -321,8 +350,21 @@ def _with_limit(
         rms=after,
         starts=0.0,
         estimated=_estimated(best, numbers, cov),
-        found=found_of(best, fitted, given, at_limit.controller, law.period, law.every > 1),
+        found=_with_time(found_of(best, fitted, given, at_limit.controller, law.period, slow), at_limit if slow else None),
     )
+
+
+def _with_time(found: FoundNumbers, limit: Limited | None) -> FoundNumbers:
+    """The numbers with the tracking time of a slower log's anti-windup, which what it lost between its lines moves, too."""
+    time = None if limit is None else limit.controller.velocity.tracking_time
+    if limit is None or time is None or not 0.0 < limit.time_std < np.inf:
+        return found
+
+    def tracked(controller: Controller, time: float) -> Cascade:
+        cascade = cascade_of(controller)
+        return replace(cascade, velocity=replace(cascade.velocity, tracking_time=time))
+
+    return found.with_number((ANTI_WINDUP, "tracking_time"), time, limit.time_std, tracked)
 
 
 def _estimated(best: FormCandidate, numbers: Vector, cov: Matrix) -> dict[str, tuple[float, float]]:

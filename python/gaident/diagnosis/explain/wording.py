@@ -8,6 +8,7 @@ import numpy as np
 
 from gaident.axis import Text, called, joined, say
 from gaident.control.found import FoundNumbers
+from gaident.diagnosis.explain.ends import NO_ENDS, Ends
 from gaident.diagnosis.library.sides import called_of
 from gaident.diagnosis.selection.offset import Offset
 from gaident.diagnosis.selection.select import Selection
@@ -38,18 +39,16 @@ ON_A_SPRING = Text("The axis is on a spring to the ground: its tension where the
 
 
 def evidence_of(
-    effect: str, gain: float, alternatives: Sequence[str], offset: Offset | None = None, sides: Sequence[str] = ()
+    effect: str, gain: float, alternatives: Sequence[str], offset: Offset | None = None, ends: Ends = NO_ENDS
 ) -> Text:
-    """What speaks for a finding: what it does, how sure that is, what these data cannot tell from it.
-
-    sides: where on an elastic shaft it may be.
-    """
+    """What speaks for a finding: what it does, where, how sure that is, what these data cannot tell from it."""
     from gaident.show.wording import certainty
 
     what = row_of(effect).says.begun()
-    if sides:
-        what = say("{}, {}", what, end_words(sides))
-    sure, worse = certainty(gain), f"(the model without it is {gain:.0f} BIC units worse)"
+    if ends.apart:
+        what = say("{}, {}", what, end_words(ends.sides))
+    there = f", that with it {end_words((ends.other,))} {ends.worse:.0f}" if ends.worse > 0.0 else ""
+    sure, worse = certainty(gain), f"(the model without it is {gain:.0f} BIC units worse{there})"
     if alternatives:
         others = joined(" or ", map(called, alternatives))
         return say("{}, or {}: one of these is there, {} {}; these data do not say which.", what, others, sure, worse)

@@ -56,18 +56,32 @@ def depth(run: RecordView) -> str:
 
 
 def missing_over_place(run: RecordView, dhat: Vector, axis: str) -> tuple[Chart, ...]:
-    """Lines per turn, and the mean over one turn (linear: over the travel)."""
-    rotary = axis == "rotary"
-    period = math.tau if rotary else float(np.ptp(run.position)) or 1.0
+    """Lines per turn, and the mean over one turn; on a linear axis, and where it turns less than that, over the travel."""
+    rotary, travel = axis == "rotary", float(np.ptp(run.position)) or 1.0
+    whole = rotary and travel >= math.tau
+    period = math.tau if whole else travel
     lines = missing_orders(run.position, dhat, run.measured, axis)
     charts = [lines] if lines.panels[0].traces else []
-    mean = over_period(run.position, dhat, run.measured, period)
+    ways = [over_period(run.position, dhat, run.measured, period, direction=way) for way in (0, 1, -1)]
+    mean = ways[0]
     if len(mean.x) > 3:
-        x = np.degrees(mean.x) if rotary else mean.x + float(run.position.min())
-        error = Trace(x, mean.mean, "mean ± its standard error", "ink", "means", spread=mean.std / np.sqrt(mean.count))
-        text = f"The same over {'one turn' if rotary else 'the travel'}: what belongs to a place stands out of the bars."
-        panel = Panel(missing_label(axis), (error,))
-        charts.append(Chart("missing-place", "angle in a turn [deg]" if rotary else "position [m]", (panel,), text, height=300))
+
+        def shown(x: Vector) -> Vector:
+            place = x if whole else x + float(run.position.min())
+            return np.degrees(place) if rotary else place
+
+        traces = [
+            Trace(shown(one.x), one.mean, label, role, width=1.2)
+            for one, label, role in zip(ways[1:], ("forwards", "backwards"), ("faster", "slower"), strict=True)
+            if len(one.x) > 3  # no decision: printed: points of a curve
+        ]
+        error = Trace(
+            shown(mean.x), mean.mean, "mean ± its standard error", "ink", "means", spread=mean.std / np.sqrt(mean.count)
+        )
+        text = f"The same over {'one turn' if whole else 'the travel'}: what belongs to a place stands out of the bars."
+        panel = Panel(missing_label(axis), (*traces, error))
+        name = "angle in a turn [deg]" if whole else "angle [deg]" if rotary else "position [m]"
+        charts.append(Chart("missing-place", name, (panel,), text, height=300))
     return tuple(charts)
 
 

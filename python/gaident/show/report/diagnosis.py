@@ -7,6 +7,7 @@ import math
 from collections.abc import Callable, Mapping
 
 from gaident.axis import said, unit, velocity_unit, word
+from gaident.models.effect_rows import end_words
 from gaident.models.factors import gain_unit
 from gaident.results.diagnosis import Diagnosis
 from gaident.results.estimate import Estimate
@@ -173,7 +174,7 @@ def _causes(dia: Diagnosis, view: View) -> Section:
         name = joined((tag("b", cause_words(f, dia, axis)), *(joined((" or ", tag("b", other))) for other in others)))
         rows: list[Row] = [(n, *map(typeset, cells), remark) for n, *cells, remark in map(_row(view), f.parameters.items())]
         kind = "in-sample" if dia.in_sample else "held-out"
-        place = f"Place: {f.place}. " if f.place else ""
+        place = f"Place: {f.place}{f', {ends}' if (ends := end_words(f.sides)) else ''}. " if f.place else ""
         figures = f"{place}{f.delta_bic:.0f} BIC units; {kind} error against that before it: {step_words(f.gain)}."
         parts.append(
             box(
@@ -238,7 +239,7 @@ def _parameters(dia: Diagnosis, view: View, drawn: Charts) -> Section:
 def _untested(dia: Diagnosis, view: View) -> Section:
     parts = []
     if dia.not_testable:
-        text = "Of these the record says nothing, neither for nor against: it never went where they act."
+        text = "Of these the record says nothing, neither for nor against; why stands beside each."
         parts += [tag("p", text), _reasons(dia.not_testable, "why", view.axis)]
     else:
         parts.append(tag("p", "Every effect of the library could have shown itself in this record."))

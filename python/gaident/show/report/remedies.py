@@ -66,6 +66,7 @@ def _gains(do: Remedies, axis: str, drawn: Charts) -> Html:
             head,
             table(("", "before", "proposed", "unit"), [gains]),
             added if added_filters(tuned) else Html(),
+            box(sentences(beyond, axis), kind="warn") if (beyond := [d for d in tuned.doubts if d not in do.doubts]) else Html(),
             tag("p", typeset(asked_words(tuned, axis))),
             box(tag("p", unstable), kind="warn") if tuned.before.stable.value < 1.0 else Html(),
             drawn.put(_loop_chart(do.loops)),
@@ -171,6 +172,7 @@ def _table_of(found: Mended, axis: str) -> Html:
         return what, number(error), None if math.isnan(fall) else typeset(f"{round(100.0 * fall) + 0:d}")
 
     rows: list[Row] = [("as it is", number(found.now), None)]
+    hidden = any(round(100.0 * (1.0 - error / found.now)) == 0 for error in found.without.values()) if found.now > 0.0 else False
     if found.retuned is not None:
         rows.append(row("with the proposed gains", found.retuned))
     twice = [effect for effect, _ in found.without]
@@ -181,5 +183,7 @@ def _table_of(found: Mended, axis: str) -> Html:
         f"The following error (command minus motion, rms) of the extended model on {found.record}, simulated from rest: under "
         "the controller as it is, and with one cause taken out."
     )
+    if hidden:
+        text += f" A cause with 0 % does not show in it: the controller makes up for that with its {word('torque', axis)}."
     columns = ("", f"following error [{unit(found.unit, axis)}]", "less by [%]")
     return joined((tag("p", text), table(columns, [rows])))
