@@ -23,6 +23,7 @@ class AveragedResponse:
     threshold (n,): the coherence that unrelated signals pass once in twenty. instrument: whether the command was used (joint
     input-output); False: torque to velocity directly (H1). windows: how many; resolution [Hz].
     given: whether it was given as a response, without a record; then windows and threshold mean nothing.
+    torque_measured: whether the torque has noise of its own, which no model of the drive answers.
     """
 
     frequency: Vector
@@ -34,6 +35,7 @@ class AveragedResponse:
     windows: int
     resolution: float
     given: bool = False
+    torque_measured: bool = False
 
     @property
     def sentence(self) -> Text:
@@ -43,6 +45,12 @@ class AveragedResponse:
         how = f"{self.windows} half-overlapping windows, resolution {self.resolution:.2g} Hz"
         if self.instrument:
             return Text(f"Joint input-output estimate: cross spectra with the command, free of the loop's bias by noise; {how}.")
+        if self.torque_measured:
+            return say(
+                "H1 estimate from {torque} to velocity; {}. The {torque} was measured: where little of it moves the axis, its "
+                "noise makes the estimate too small.",
+                how,
+            )
         return say(
             "H1 estimate from {torque} to velocity; {}. If a controller made this {torque} out of the noisy velocity, the "
             "estimate is biased towards minus the inverse of the controller where the coherence is low.",

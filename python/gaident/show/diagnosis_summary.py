@@ -47,6 +47,7 @@ from gaident.show.wording import (
 __all__ = [
     "TESTED_UP_TO",
     "chance_words",
+    "cleared_words",
     "diagnosis_summary",
     "driver_counts",
     "left_words",
@@ -162,7 +163,17 @@ def _causes(dia: Diagnosis, axis: str, scales: Scales) -> list[str]:
         lines += _wrapped(" ".join(filter(None, (said(f.evidence, axis), part_words(dia, f, axis, scales)))), "    ")
         if f.p_value is not None:
             lines += _wrapped(chance_words(f, dia.bootstrap), "    ")
-    return ["What was found", *(line if line.startswith(" ") else f"  {line}" for line in lines)] if lines else []
+    found = [line if line.startswith(" ") else f"  {line}" for line in lines]
+    return ["What was found", *found, *(_wrapped(told, "  ") if (told := cleared_words(dia, axis)) else [])] if lines else []
+
+
+def cleared_words(dia: Diagnosis, axis: str) -> str:
+    """That the controller is as it was given, where the logged torque says so; empty elsewhere."""
+    if dia.controller is None or not (dia.torque_logged and dia.loop_follows):
+        return ""
+    if dia.controller_numbers or any(f.place == "controller" for f in dia.findings):
+        return ""
+    return said(say("The logged {torque} follows from the controller as given: what is missing is not in it."), axis)
 
 
 def chance_words(finding: Finding, bootstrap: int) -> str:

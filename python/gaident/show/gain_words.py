@@ -14,6 +14,7 @@ from gaident.show.wording import diverges, number, with_std
 __all__ = [
     "alone_words",
     "comparison_rows",
+    "digits_apart",
     "fall_words",
     "force_rows",
     "force_words",
@@ -91,9 +92,14 @@ def fall_words(dia: Diagnosis) -> str:
         else:
             hidden = Text(": the loop's integrator hides this effect in the velocity")
         return say("The error of the velocity hardly changes ({:+.1f} %){}.", -fall, hidden)
-    digits = next((d for d in range(4) if f"{low:.{d}f}" != f"{high:.{d}f}"), None) if math.isfinite(low) else None
+    digits = digits_apart(low, high)
     interval = f" (95 % interval {low:.{digits}f} to {high:.{digits}f} %)" if digits is not None else ""
     return say("The error falls by {:.{}f} %{}.", fall, digits or 0, interval)
+
+
+def digits_apart(low: float, high: float) -> int | None:
+    """The fewest decimals with which two numbers print differently; None of what is not finite, or the same to three."""
+    return next((d for d in range(4) if f"{low:.{d}f}" != f"{high:.{d}f}"), None) if math.isfinite(low) else None
 
 
 def _growth_words(dia: Diagnosis, growth: float) -> Text:

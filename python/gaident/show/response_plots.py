@@ -70,7 +70,7 @@ def response_chart(r: Responses, axis: str, hz: bool = True) -> Chart:
     text = f"{said(m.sentence, axis)} Bars: 2 standard deviations."
     if hidden:
         text += f" {hidden} of {len(sure)} points are not drawn, as their coherence is what chance gives (dashed)."
-    if not m.given:
+    if s is not None:
         text += (
             " Friction and other nonlinear effects change the record's response; the model estimated the same way has them too."
         )

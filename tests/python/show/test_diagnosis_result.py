@@ -583,6 +583,6 @@ def test_the_end_of_the_shaft_that_the_data_exclude_is_said_with_what_it_costs()
 
     there = evidence_of("coulomb_friction", 400.0, (), None, Ends(("load",), True, "motor", 118.4))
     assert there.startswith("Dry friction of constant size, at the load: beyond doubt")
-    assert there.endswith("(the model without it is 400 BIC units worse, that with it at the motor 118).")
+    assert there.endswith("(the model without it is 400 BIC units worse, with it at the motor 118).")
     open_ = evidence_of("coulomb_friction", 400.0, (), None, Ends(("motor", "load"), True))
     assert "at the motor or at the load (these data do not say which)" in open_ and open_.endswith("400 BIC units worse).")

@@ -47,7 +47,7 @@ def evidence_of(
     what = row_of(effect).says.begun()
     if ends.apart:
         what = say("{}, {}", what, end_words(ends.sides))
-    there = f", that with it {end_words((ends.other,))} {ends.worse:.0f}" if ends.worse > 0.0 else ""
+    there = f", with it {end_words((ends.other,))} {ends.worse:.0f}" if ends.worse > 0.0 else ""
     sure, worse = certainty(gain), f"(the model without it is {gain:.0f} BIC units worse{there})"
     if alternatives:
         others = joined(" or ", map(called, alternatives))

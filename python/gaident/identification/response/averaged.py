@@ -17,6 +17,7 @@ suffers both alike, so that these two may be compared where the bare curve of th
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,6 +28,7 @@ from gaident.control.pi import PI
 from gaident.control.pi_torque import pi_torque
 from gaident.data.frequency.response import FrequencyResponse
 from gaident.data.record import Record
+from gaident.data.torque_kind import MEASURED
 from gaident.errors import RecordError
 from gaident.identification.response.held import held_response
 from gaident.models.held_torque import held_mean
@@ -61,9 +63,9 @@ def response_of(rec: Record, model: Model, controller: PI | None = None) -> Resp
     sound = bool(np.all(np.isfinite(done.velocity)) and np.abs(done.velocity).max() < 1e3 * np.abs(rec.velocity).max())
     low, high = float(measured.frequency[0]), float(measured.frequency[-1])
     fine = _fine(model, low, high)
-    return Responses(
-        measured, simulated_response(done, rec) if sound else None, fine, sampled_response(model, fine, rec.dt, controller)
-    )
+    alike = sound and rec.torque_is != MEASURED  # a model answers the noise of a measured torque, which the drive did not
+    own = sampled_response(model, fine, rec.dt, controller)
+    return Responses(measured, simulated_response(done, rec) if alike else None, fine, own)
 
 
 def responses_of(given: Sequence[FrequencyResponse], model: Model | None) -> Responses:
@@ -118,7 +120,8 @@ def measured_response(rec: Record, controller: PI | None = None) -> AveragedResp
     if _constant(torque):
         text = "the {torque} never changes, so that it excites no frequency; use a record whose {torque} changes"
         raise RecordError(say(text))
-    return _estimate(torque, rec.velocity, rec.command, rec.dt)
+    found = _estimate(torque, rec.velocity, rec.command, rec.dt)
+    return replace(found, torque_measured=rec.torque is not None and rec.torque_is == MEASURED)
 
 
 def simulated_response(run: Run, rec: Record) -> AveragedResponse:

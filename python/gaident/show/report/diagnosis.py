@@ -15,12 +15,14 @@ from gaident.results.finding import Finding
 from gaident.show.diagnosis_summary import (
     TESTED_UP_TO,
     chance_words,
+    cleared_words,
     left_words,
     mechanical_name,
     moved_words,
     next_words,
     parameter_row,
 )
+from gaident.show.gain_words import digits_apart
 from gaident.show.html import Html, Row, joined, number, table, tag, typeset
 from gaident.show.relevance_words import bent_of, part_words, relevance_words, remark_words
 from gaident.show.report import charts
@@ -120,23 +122,19 @@ def tiles(dia: Diagnosis, view: View) -> Html:
         )
     )
     if dia.model.effects and dia.before.rmse > 0.0 and not (diverges(dia.before) or diverges(dia.after)):
-        low, high = dia.gain_interval
-        interval = typeset(f"95 % interval of the fall: {percent(low)} to {percent(high)} %") if math.isfinite(low) else ""
+        low, high = (100.0 * x + 0.0 for x in dia.gain_interval)
+        digits = digits_apart(low, high)
+        interval = typeset(f"95 % interval of the fall: {low:.{digits or 0}f} to {high:.{digits or 0}f} %")
         fall = 1.0 - dia.after.rmse / dia.before.rmse
         worse = fall < -0.005  # no decision: printed: as 0 %
         label = "worse in free run: the error grows by" if worse else "the error falls by"
-        shown.append(tile(label, typeset(f"{percent(abs(fall))} %"), interval))
+        shown.append(tile(label, typeset(f"{100.0 * abs(fall):.{digits or 0}f} %"), interval if math.isfinite(low) else ""))
     return joined(shown)
 
 
 def _unit_of(value: float, si: str, view: View) -> Html:
     """The unit in which a value is shown, with the value in SI behind where that is another."""
     return joined((typeset(view.scales[si][0]), " (", number(value), " ", typeset(si), ")")) if si in view.scales else typeset(si)
-
-
-def percent(share: float) -> str:
-    """Whole per cents, without a minus before 0."""
-    return f"{round(100.0 * share) + 0:d}"
 
 
 def chapters(dia: Diagnosis, view: View, drawn: Charts) -> list[Section]:
@@ -186,6 +184,8 @@ def _causes(dia: Diagnosis, view: View) -> Section:
                 kind="cause" if not f.alternatives else "cause warn",
             )
         )
+    if causes and (told := cleared_words(dia, axis)):
+        parts.append(tag("p", told))
     if any(f.alternatives for f in causes):
         parts.append(box(tag("p", tag("b", "What “cannot be told apart” means. "), CANNOT_TELL), kind="quiet"))
     noise = [f for f in dia.findings if f.is_noise]
@@ -294,7 +294,8 @@ def _how(dia: Diagnosis, view: View) -> Section:
     rows: dict[str, str | None] = {
         "controller": typeset(controller_words(dia.controller, view.axis)),
         "held out": dia.held_out,
-        "linear model": f"({idn.p},{idn.q}), {idn.settings.engine} engine, seed {idn.seed}",
+        "linear model": f"begun with {idn.p} poles and {idn.q} zeros ({idn.settings.engine} search, seed {idn.seed}), "
+        f"reported with {dia.model.p} and {dia.model.q}",
         "noise": "from the record" if dia.noise is None else typeset(f"given: {dia.noise:.4g} {velocity_unit(view.axis)}"),
         "bootstrap": f"{dia.bootstrap} simulated records" if dia.bootstrap else "none asked for",
         "seed": str(dia.seed),
