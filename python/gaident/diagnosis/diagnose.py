@@ -19,6 +19,7 @@ from gaident.diagnosis.controller.driving import Driving, driving_of
 from gaident.diagnosis.controller.form_findings import Loop, loop_of
 from gaident.diagnosis.controller.joint_numbers import better_under
 from gaident.diagnosis.explain.expected import outside_of
+from gaident.diagnosis.explain.wording import not_borne_out
 from gaident.diagnosis.gains import judges_selected
 from gaident.diagnosis.note import Note
 from gaident.diagnosis.records.arguments import (
@@ -141,7 +142,17 @@ def diagnose(
         given, lines = outliers_of_the_log(recorded, checked_controller(controller))
         asked = loop_of(given, checked_controller(controller))
         prepared = [_Prepared.of(asked, given, apart)]
-    checked(*prepared[0].all_records, prepared[0].driven.loop, identification, bootstrap, seed, progress, axis, pitch)
+    checked(
+        prepared[0].records,
+        prepared[0].validating,
+        prepared[0].driven.loop,
+        identification,
+        bootstrap,
+        seed,
+        progress,
+        axis,
+        pitch,
+    )
     noise_std, asked_accuracy, ranges = noise_std_of(noise), accuracy_of(accuracy), expected_of(expected)
     if not isinstance(quick, bool):
         raise SettingsError(f"quick is {quick!r}: give True or False")
@@ -157,11 +168,20 @@ def diagnose(
         driving = driven_under(prepared[0])
         note(0.02, "identifying the linear model")
 
+        linear_under: dict[int, tuple[Driving, Identification]] = {}
+
+        def identified(driving: Driving) -> Identification:
+            """The linear model under a controller, identified once."""
+            if id(driving) not in linear_under:
+                idn = identify(list(driving.moved.records), bare_pi(driving.controller), seed=seed)
+                linear_under[id(driving)] = driving, idn
+            return linear_under[id(driving)][1]
+
         def searched(driving: Driving, most: int, idn: Identification | None = None) -> Work:
-            here, pi = driving.moved, bare_pi(driving.controller)
+            here = driving.moved
             note.searching()
             if idn is None:
-                idn = identify(list(here.records), pi, seed=seed)
+                idn = identified(driving)
                 note.identified()
             work = Work(here.records, here.validation, driving, idn, noise_std, note, axis, pitch, most)
             work.search()
@@ -201,11 +221,12 @@ def diagnose(
             for simpler in asked.simpler:
                 prepared.append(_Prepared.of(simpler, given, apart))
                 beside = driven_under(prepared[-1])
-                linear = identify(list(beside.moved.records), bare_pi(beside.controller), seed=seed)
-                if POLICY.each_number * linear.rmse < work.idn.rmse:
+                here, there = (identified(one) for one in (driving, beside))
+                if POLICY.each_number * there.rmse < here.rmse:
                     note(0.03, "once more, under a simpler controller")
-                    plain = with_rule(searched(beside, most, linear), most)
+                    plain = with_rule(searched(beside, most, there), most)
                     if plain.leaves_noise and (not work.leaves_noise or _explains_more(plain, work)):
+                        plain.notes.append(not_borne_out(asked.findings, simpler.findings))
                         work = plain
                         break
             given_work = work
@@ -260,36 +281,31 @@ def diagnose(
 
 
 class _Prepared(NamedTuple):
-    """The records as a loop's torque drives a model; given, kept: those to fit and to validate as its controller read them."""
+    """The records to fit and to validate, as a loop's torque drives a model; given, kept: as its controller read them."""
 
     loop: Loop
     given: tuple[Record, ...]
     kept: tuple[Record, ...]
     driven: Driven
+    records: tuple[Record, ...]
+    validating: tuple[Record, ...]
 
     @classmethod
     def of(cls, asked: Loop, records: Sequence[Record], apart: Sequence[Record]) -> _Prepared:
         given = tuple(timed(records, asked.controller))
         kept = tuple(timed(outliers_of_the_log(apart, asked.controller)[0], asked.controller))
-        return cls(asked, given, kept, torque_driven(given, asked.controller))
+        driven = torque_driven(given, asked.controller)
+        later = torque_driven(kept, asked.controller).records if kept else ()
+        fitted = tuple(on_lines(r, driven.controller) for r in driven.records)
+        return cls(asked, given, kept, driven, fitted, tuple(on_lines(r, asked.controller) for r in later))
 
     @property
     def read(self) -> tuple[Record, ...]:
         return (*self.given, *self.kept)
 
-    @property
-    def all_records(self) -> tuple[tuple[Record, ...], tuple[Record, ...]]:
-        """(those to fit, those to validate)."""
-        controller = self.loop.controller
-        later = torque_driven(self.kept, controller).records if self.kept else ()
-        return tuple(on_lines(r, self.driven.controller) for r in self.driven.records), tuple(
-            on_lines(r, controller) for r in later
-        )
-
     def driving(self) -> Driving:
-        records, validating = self.all_records
-        origin = {r.digest: whole for r, whole in zip((*records, *validating), self.read, strict=True)}
-        return driving_of(in_order(records), in_order(validating), self.loop, self.driven, origin)
+        origin = {r.digest: whole for r, whole in zip((*self.records, *self.validating), self.read, strict=True)}
+        return driving_of(in_order(self.records), in_order(self.validating), self.loop, self.driven, origin)
 
 
 def _explains_more(one: Work, given: Work) -> bool:

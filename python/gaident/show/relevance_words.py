@@ -30,7 +30,7 @@ def relevance_words(dia: Diagnosis, axis: str, scales: Scales) -> str:
         if value is not None
     ]
     it = "it is" if dia.driver is not None else "what is left is"
-    begun = f"Beyond what noise leaves {it} {size}"
+    begun = f"Beyond what noise leaves, {it} {size}"
     noise = f"noise alone leaves {_shown(r.noise, v, scales)} of a free run"
     if r.torque_noise is not None:
         noise += f", noise and filter {_shown(r.torque_noise, u, scales)} of the {torque}"

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 import gaident as ga
 from drive_rig import Noise, Plant, log_of, run_drive, skip_without_library
-from gaident.diagnosis.controller.measured_lag import commanded, lag_shown
-from gaident.diagnosis.controller.other_form import behind_a_lag
+from gaident.diagnosis.controller.as_read import outliers_of_the_log
+from gaident.diagnosis.controller.measured_lag import behind_a_lag, commanded, lag_shown
 
 T = 0.5e-3
 PI = ga.PI(0.05, 2.0)
@@ -114,11 +116,11 @@ def test_a_lag_of_the_measured_current_is_not_said_to_be_other_gains() -> None:
 CASCADE = ga.Cascade(ga.PI(0.05, 2.0, rule="backward"), period=T / 4)
 
 
-def slow_record(lag: float, noise: float, seed: int = 5) -> ga.Record:
+def slow_record(lag: float, noise: float, seed: int = 5, cascade: ga.Cascade = CASCADE) -> ga.Record:
     """Every fourth sample of a controller: the motion, and the torque of the motor behind a lag that was not given."""
     skip_without_library()
     filters = (ga.LowPass(lag),) if lag else ()
-    plant = Plant(J=1e-3, D=2e-3, kp=0.05, ki=2.0, dt=T, cascade=ga.Cascade(CASCADE.velocity, T / 4, torque_filters=filters))
+    plant = Plant(J=1e-3, D=2e-3, kp=0.05, ki=2.0, dt=T, cascade=replace(cascade, torque_filters=filters))
     levels = np.array([0.0, 30.0, 60.0, 12.0, -24.0, -60.0, -18.0, 6.0, 42.0, 0.0, 3.0, -3.0, 0.0])
     before, ramp = np.append(0.0, levels[:-1]), 0.125 * np.arange(800)
     ramps = np.concatenate([a + np.clip(b - a, -ramp, ramp) for a, b in zip(before, levels, strict=True)])
@@ -141,3 +143,42 @@ def test_a_measured_torque_of_a_slow_log_lags_by_a_low_pass(seed: int) -> None:
 def test_a_noise_of_the_measured_torque_is_no_lag_and_a_commanded_one_has_none(seed: int) -> None:
     assert behind_a_lag([slow_record(0.0, 0.005, seed)], [], CASCADE) is None
     assert behind_a_lag([slow_record(0.8e-3, 0.005, seed).with_channels(torque_is="commanded")], [], CASCADE) is None
+
+
+def test_what_was_given_beside_the_lag_stays() -> None:
+    given = replace(CASCADE, velocity=replace(CASCADE.velocity, torque_limit=50.0, anti_windup="hold"))
+    form = behind_a_lag([slow_record(0.8e-3, 0.005)], [], given)
+    assert form is not None and form.controller.velocity == given.velocity
+    assert [type(f) for f in form.controller.torque_filters] == [ga.LowPass]
+
+
+@pytest.mark.parametrize("lines", [1, 2])
+def test_a_torque_that_a_slow_log_writes_late_has_no_lag(lines: int) -> None:
+    rec = slow_record(0.0, 0.005)
+    assert rec.torque is not None
+    late = rec.with_channels(torque=np.concatenate([np.zeros(lines), rec.torque[:-lines]]))
+    assert behind_a_lag([late], [], CASCADE) is None
+
+
+@pytest.mark.long
+def test_a_lag_behind_the_current_of_a_slow_log_is_found_with_the_friction() -> None:
+    """The torque follows without it, too, within what its log can show."""
+    dia = ga.diagnose(slow_record(0.8e-3, 0.005), CASCADE)
+    found = {f.effect: f.parameters for f in dia.causes}
+    assert set(found) == {"torque_filter", "coulomb_friction"} and dia.verdict == "explained", dia.summary()
+    assert found["torque_filter"]["time_constant"].value == pytest.approx(0.8e-3, rel=0.02)
+    assert found["coulomb_friction"]["torque"].value == pytest.approx(0.1, rel=0.01)
+    assert dia.mechanics["inertia"].value == pytest.approx(1e-3, rel=0.005)
+
+
+@pytest.mark.parametrize("known", [True, False])
+def test_outliers_of_a_slow_log_are_found_at_a_torque_limit_too(known: bool) -> None:
+    """There the torque answers no velocity; elsewhere it says that these are of the log alone."""
+    limited = ga.Cascade(ga.PI(0.05, 2.0, torque_limit=0.25, anti_windup="hold"), T / 4)
+    rec, rng = slow_record(0.0, 0.0, cascade=limited).with_channels(torque_is="commanded"), np.random.default_rng(3)
+    at = np.sort(rng.choice(len(rec), 26, replace=False))
+    spoiled = rec.velocity.copy()
+    spoiled[at] += rng.choice([-1.0, 1.0], 26) * rng.uniform(10.0, 60.0, 26)
+    given = limited if known else ga.Cascade(ga.PI(0.05, 2.0), T / 4)
+    _, (lines,) = outliers_of_the_log([rec.with_channels(velocity=spoiled)], given)
+    assert lines.tolist() == at.tolist()

@@ -52,3 +52,12 @@ def test_a_torque_at_its_limit_does_not_tell_an_outlier_of_the_log() -> None:
     for known in (given(controller), controller):
         (read,), (lines,) = outliers_of_the_log([rec], known)
         assert read is rec and not len(lines)
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("loop", ["ip", "torque low pass"])
+def test_a_form_is_found_beside_gains_that_are_not_known(loop: str) -> None:
+    rec, _, controller, _ = industrial_case(loop, 4, "", SEED)
+    unknown = ga.Cascade(ga.PI(None, None), period=controller.period)
+    found = loop_of([rec], unknown)
+    assert {f.effect for f in found.findings} & {"command_weight", "torque_filter"} and found.estimates

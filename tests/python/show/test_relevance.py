@@ -88,7 +88,7 @@ def said(relevance: Relevance | None, driver: str | None = "position", **more: A
 def test_the_size_is_in_the_users_unit_with_si_behind() -> None:
     left = Relevance(0.1, 0.3, 0.002, 0.004)
     assert said(left) == (
-        "Beyond what noise leaves it is 0.95 rpm (0.1 rad/s) rms in the velocity and 0.002 N m rms in the torque. In size that "
+        "Beyond what noise leaves, it is 0.95 rpm (0.1 rad/s) rms in the velocity and 0.002 N m rms in the torque. In size that "
         "is negligible: noise alone leaves 2.9 rpm (0.3 rad/s) of a free run, noise and filter 0.004 N m of the torque. "
         "Significant means that chance does not make it."
     )

@@ -12,7 +12,8 @@ from friction_drive import CONTROLLER, drive_record
 from gaident.reporting.remedies import remedies_of
 from gaident.reporting.report import report_page
 from gaident.show.report import parts
-from gaident.show.report.views import Remedies
+from gaident.show.report.remedies import _table_of
+from gaident.show.report.views import Mended, Remedies
 from page import Reader, charts_of
 from report_cases import diagnosed, retuned_once
 
@@ -111,3 +112,11 @@ def test_under_a_position_controller_the_position_follows(dia: ga.Diagnosis, no_
     assert found.no_gains == "not here"
     lost = remedies(replace(dia, controller=loop, records=(rec,)))
     assert lost.mended is None and "no command that the loop follows" in lost.no_mended
+
+
+def test_a_cause_that_hides_or_cannot_be_taken_out_is_a_row_all_the_same() -> None:
+    without = {("coulomb_friction", ""): float("inf"), ("cogging", ""): 0.1001, ("load_torque", ""): 0.05}
+    text = str(_table_of(Mended("run", "rad/s", 0.1, None, without), "rotary"))
+    assert "A cause with 0 % does not show in it" in text and "without coulomb friction" in text
+    seen = str(_table_of(Mended("run", "rad/s", 0.1, None, {("load_torque", ""): 0.05}), "rotary"))
+    assert "does not show in it" not in seen

@@ -31,6 +31,7 @@ __all__ = ["as_read", "in_terms_of_the_log", "outliers_of_the_log"]
 Lines = NDArray[np.intp]
 Vector = NDArray[np.float64]
 
+MOST = 0.5  # no decision: a formula: the most of some lines
 AROUND = np.arange(-1, 2)  # no decision: a formula: a line's velocity is in the torques from the line before to the one behind
 TINY = 1e-300  # no decision: no division by 0
 SPEED_STEP = 1e-6  # no decision: the step of a difference, of the highest speed
@@ -69,9 +70,9 @@ def _of_the_log(rec: Record, controller: Controller | None) -> tuple[Record, Lin
     none = np.zeros(0, dtype=np.intp)
     if controller is None or controller.unknown or controller.loop != "sampled" or not tells_of_controller(rec, controller):
         return rec, none
-    lines, cascade = _unlimited_lines(rec, outliers(rec.velocity)), cascade_of(controller)
-    if not len(lines):
-        return rec, none
+    found, cascade = outliers(rec.velocity), cascade_of(controller)
+    told = _told_lines(rec, found)
+    lines = told
     while len(lines):
         interpolated = cleaned(rec, lines)
         without, spread = _answered(interpolated, lines, cascade)
@@ -83,11 +84,17 @@ def _of_the_log(rec: Record, controller: Controller | None) -> tuple[Record, Lin
         lines = lines[stays]
     if not len(lines):
         return rec, none
+    untold = np.setdiff1d(found, told)
+    if len(untold) and len(lines) > MOST * len(told):
+        without, lines = cleaned(without, untold), np.union1d(lines, untold)
     return (without, lines) if run_error([without], cascade) < run_error([rec], cascade) else (rec, none)
 
 
-def _unlimited_lines(rec: Record, lines: Lines) -> Lines:
-    """Those of the lines around which the torque is not at its plateau: a torque at a limit answers no velocity."""
+def _told_lines(rec: Record, lines: Lines) -> Lines:
+    """Those of the lines around which the torque is not at its plateau: a torque at a limit answers no velocity.
+
+    What they are, of the log alone or what the controller read, the others are taken to be, too.
+    """
     assert rec.torque is not None
     size = np.abs(rec.torque)
     limited = np.flatnonzero(size >= POLICY.at_limit * plateau_of(size))

@@ -19,8 +19,8 @@ from gaident.diagnosis.controller.controller_place import AsLogged, as_logged
 from gaident.diagnosis.controller.form_findings import Loop, driver_of
 from gaident.diagnosis.controller.limit_not_given import by_a_limit
 from gaident.diagnosis.controller.log_shift import Aligned, aligned
-from gaident.diagnosis.controller.measured_lag import Lag, commanded, lag_shown
-from gaident.diagnosis.controller.other_form import behind_a_lag, other_form, other_scheme
+from gaident.diagnosis.controller.measured_lag import Lag, behind_a_lag, commanded, lag_shown
+from gaident.diagnosis.controller.other_form import other_form, other_scheme
 from gaident.diagnosis.controller.wrong_number import OtherRule, closer_form, other_rules, with_findings, wrong_numbers
 from gaident.diagnosis.library.terms import LIBRARY
 from gaident.diagnosis.unlogged.other_gains import OTHER_GAINS, OtherGains
@@ -193,7 +193,7 @@ def driving_of(
                 found = other.found
                 records, validation, origin = _again(records, validation, origin, partial(driven_by, controller=controller))
                 moved = aligned(records, validation, None, True)
-    if form is None and pi is None and driven.slower and not limited and not asked.findings and not doubts:
+    if form is None and pi is None and driven.slower and not limited and not asked.findings:
         assert controller is not None
         later = [origin.get(r.digest, r) for r in validation]
         form = behind_a_lag([origin.get(r.digest, r) for r in records], later, controller)

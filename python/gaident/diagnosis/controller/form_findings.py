@@ -170,8 +170,8 @@ def _loop_of(records: Sequence[Record], given: Controller | None) -> Loop:
     if shown is None or (not numbers.estimates and left_by_a_limit(records, Cascade(pi, dt / every)) < shown.rms):
         return replace(as_given, numbers=numbers.trusted())  # or a single limit, which the simulated loop shows, explains more
     formed = [_shown_loop(one, numbers, records) for one in (shown, *shown.simpler)]
-    trusted = replace(as_given, numbers=numbers.trusted())
-    simpler = [trusted] if follow([plain_of(r) for r in records], Cascade(pi, dt / every)) else []
+    as_it_is = not numbers.doubt and follow([plain_of(r) for r in records], Cascade(pi, dt / every))
+    simpler = [replace(as_given, numbers=numbers.trusted())] if as_it_is else []
     return replace(formed[0], simpler=(*simpler, *formed[1:]))
 
 

@@ -13,6 +13,10 @@ A torque that is only late has a = 0: a lag is found where a is beyond its devia
 and where no whole number of lines by which the torque is late comes near in that criterion.
 Where the lag explains the log no worse, no gains are said to be other, and the torque that the controller makes drives the model:
 it has no noise, and the lag stands between it and the shaft, where the search finds it in the motion too.
+
+In a log slower than its controller the lag is a low pass in the path of the given controller's torque (`behind_a_lag`).
+Its time is the one with which the whole run comes closest to the logged torque.
+It stands where a torque that is late by whole lines does not come as close.
 """
 
 from __future__ import annotations
@@ -24,21 +28,33 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gaident.axis import Text, say
+from gaident.control.cascade import Cascade, cascade_of
+from gaident.control.controller import Controller
 from gaident.control.filtering import filtered
+from gaident.control.filters import LowPass
+from gaident.control.found import FoundNumbers
 from gaident.control.pi import PI
 from gaident.control.pi_torque import pi_torque
 from gaident.data.record import Record
 from gaident.data.torque_kind import COMMANDED, MEASURED, SAMPLE
-from gaident.estimation.criterion import bic
+from gaident.diagnosis.controller.form_findings import Driver
+from gaident.diagnosis.controller.slow_forms import follow, run_error, time_std
+from gaident.estimation.criterion import bic, gained
+from gaident.identification.logged_torque import comparable
 from gaident.identification.replay.causes import white_noise
 from gaident.identification.replay.replay import replay
+from gaident.models.drive_torque import driven_by
 from gaident.policy.table import POLICY
+from gaident.results.estimate import Estimate
+from gaident.results.finding import Finding
 
-__all__ = ["Lag", "commanded", "lag_shown"]
+__all__ = ["Lag", "behind_a_lag", "commanded", "lag_shown"]
 
 Vector = NDArray[np.float64]
 Matrix = NDArray[np.float64]
 
+LAG_TIMES = 16  # no decision: a grid: times of a low pass
+LAG_EXACT = 1e-6  # no decision: of a solver: where its search ends, of the logarithm of a time
 SAMPLES_LATE = (0, 1)  # no decision: a grid: the ways in which a log is written
 POLE_STEP = 1e-4  # no decision: the step of a difference, of a lag's pole
 NEAR = 1e-3  # no decision: of a range's end, within which a search stands at it
@@ -217,3 +233,59 @@ def _without(parts: Sequence[_Part], controller: PI) -> float:
         off = u - (table / sizes) @ np.linalg.lstsq(table / sizes, u, rcond=1e-12)[0]
         best = min(best, bic(float(np.mean(off**2)), len(u), table.shape[1]))
     return best
+
+
+def behind_a_lag(records: Sequence[Record], validation: Sequence[Record], given: Controller) -> Driver | None:
+    """The given controller with a low pass in the path of its torque, where measured torques of a slower log show one; else None.
+
+    A motor's current lags behind what its controller asks for, by the current loop or by a filter.
+    That is a part of what is read as "follows", and so it is looked for whether the torques follow without it or not.
+    """
+    from scipy.optimize import minimize_scalar
+
+    cascade = cascade_of(given)
+    if cascade.torque_filters or any(r.torque_is != MEASURED or not comparable(r, cascade) for r in records):
+        return None
+
+    def lagging(time: float) -> Cascade:
+        return replace(cascade, torque_filters=(LowPass(time),))
+
+    def left(logarithm: float) -> float:
+        return run_error(records, lagging(float(np.exp(logarithm))))
+
+    dt = records[0].dt
+    grid = np.log(dt * np.geomspace(POLICY.fastest_lag, POLICY.slowest_lag, LAG_TIMES))
+    k = int(np.argmin([left(x) for x in grid]))
+    if not 0 < k < LAG_TIMES - 1:
+        return None
+    best = minimize_scalar(left, bounds=(grid[k - 1], grid[k + 1]), method="bounded", options={"xatol": LAG_EXACT})
+    time, behind, without = float(np.exp(best.x)), float(best.fun), run_error(records, cascade)
+    late = min(_late_by_lines(records, cascade, lines) for lines in range(1, POLICY.log_late + 1))
+    if not behind < min(POLICY.each_number * without, POLICY.better_reason * late) or not follow(records, lagging(time)):
+        return None
+    std = time_std(records, lagging, time)
+    if not time > POLICY.check_deviations * std:
+        return None
+    text = (
+        "The measured {torque} lags behind what the controller asks for, by a low pass of {:.3g} ms: with it that follows to "
+        "{:.2g} {N m} rms, without it to {:.2g} {N m}. That is the current loop, or a filter of it that was not given."
+    )
+    ms = 1e3  # no decision: a unit: in a second
+    note, n = say(text, ms * time, behind, without), sum(map(len, records))
+    lag = {"time_constant": Estimate(time, std, "s")}
+    finding = Finding("torque_filter", lag, (), 0.0, gained(n * without**2, n * behind**2, n, 1), None, note, place="controller")
+    found = FoundNumbers(
+        made=lambda at: lagging(float(at[0])),
+        at=np.array([time]),
+        covariance=np.array([[std**2]]),
+        low=POLICY.negligible * time,
+        named=lambda at, spread: {"torque_filter": {"time_constant": (float(at[0]), float(np.sqrt(spread[0, 0])))}},
+    )
+    driven, later = (tuple(driven_by(r, lagging(time)) for r in part) for part in (records, validation))
+    return Driver(driven, later, lagging(time), (finding,), (note,), {}, found)
+
+
+def _late_by_lines(records: Sequence[Record], cascade: Cascade, lines: int) -> float:
+    """What is left of the torque [N m], rms, where the log wrote it so many lines late."""
+    moved = [r[:-lines].with_channels(torque=r.torque[lines:]) for r in records if r.torque is not None]
+    return run_error(moved, cascade)

@@ -16,11 +16,10 @@ from gaident.control.controller import Controller
 from gaident.control.filters import LowPass
 from gaident.control.pi import PI
 from gaident.data.record import Record
-from gaident.data.torque_kind import MEASURED
 from gaident.diagnosis.controller.form import FEEDS, FILTER_NAMES
 from gaident.diagnosis.controller.form_findings import Driver, findings_of, notes_of, parts_of
 from gaident.diagnosis.controller.forms import form_shown
-from gaident.diagnosis.controller.slow_forms import run_error, torque_spread
+from gaident.diagnosis.controller.slow_forms import torque_spread
 from gaident.diagnosis.library.settings import ANTI_WINDUP, OF_SETTING
 from gaident.estimation.criterion import gained
 from gaident.identification.logged_torque import comparable, not_followed
@@ -30,7 +29,7 @@ from gaident.policy.table import POLICY
 from gaident.results.estimate import Estimate
 from gaident.results.finding import Finding
 
-__all__ = ["behind_a_lag", "other_form", "other_scheme"]
+__all__ = ["other_form", "other_scheme"]
 
 SCHEMES = {
     DECAY: (ANTI_WINDUP, "kept", "1", "its integral keeps the share {:.4g} in each sample at the {torque} limit{}"),
@@ -84,35 +83,6 @@ def other_form(records: Sequence[Record], validation: Sequence[Record], given: C
     driven, later = (tuple(driven_by(r, found) for r in part) for part in (records, validation))
     numbers = None if shown is None else shown.found.then(lambda one: replace(cascade_of(one), delay=cascade.delay))
     return Driver(driven, later, found, findings, notes, {}, numbers)
-
-
-def behind_a_lag(records: Sequence[Record], validation: Sequence[Record], given: Controller) -> Driver | None:
-    """The given controller with a low pass in the path of its torque, where measured torques of a slower log show one; else None.
-
-    A motor's current lags behind what its controller asks for: by the current loop, or by a filter of the torque.
-    That is a part of what is read as "follows", and so it is looked for whether the torques follow without it or not.
-    """
-    if any(r.torque_is != MEASURED for r in records):
-        return None
-    form, cascade = other_form(records, validation, given), cascade_of(given)
-    if form is None or cascade.torque_filters or not _a_low_pass_alone(form):
-        return None
-    left, without = run_error(records, form.controller), run_error(records, cascade)
-    if not left < POLICY.each_number * without:
-        return None
-    (lag,) = form.controller.torque_filters
-    assert isinstance(lag, LowPass) and lag.time_constant is not None
-    text = (
-        "The measured {torque} lags behind what the controller asks for, by a low pass of {:.3g} ms: with it that follows "
-        "to {:.2g} {N m} rms, without it to {:.2g} {N m}. That is the current loop, or a filter of it that was not given."
-    )
-    ms = 1e3  # no decision: a unit: in a second
-    return replace(form, notes=(say(text, ms * lag.time_constant, left, without),))
-
-
-def _a_low_pass_alone(form: Driver) -> bool:
-    filters = form.controller.torque_filters
-    return [f.effect for f in form.findings] == ["torque_filter"] and len(filters) == 1 and isinstance(filters[0], LowPass)
 
 
 def other_scheme(

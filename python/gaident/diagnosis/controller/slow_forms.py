@@ -7,7 +7,7 @@ the scheme with the least squares of what is left of the torque.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -23,7 +23,7 @@ from gaident.identification.logged_torque import comparable, not_followed
 from gaident.models.starts import starts_moving
 from gaident.policy.table import POLICY
 
-__all__ = ["Limited", "follow", "limited", "run_error", "too_fast", "torque_spread"]
+__all__ = ["Limited", "follow", "limited", "run_error", "time_std", "too_fast", "torque_spread"]
 
 Vector = NDArray[np.float64]
 
@@ -120,16 +120,24 @@ def _by_windup(records: Sequence[Record], given: Cascade, best: Cascade) -> floa
 
 
 def _time_std(records: Sequence[Record], best: Cascade) -> float:
-    """Deviation of a tracking time [s], by what is left and how the torque changes with it; 0 without one.
+    """Deviation of a tracking time [s]; 0 without one."""
+    time = best.velocity.tracking_time
+
+    def tracked(at: float) -> Cascade:
+        return replace(best, velocity=replace(best.velocity, tracking_time=at))
+
+    return 0.0 if time is None else time_std(records, tracked, time)
+
+
+def time_std(records: Sequence[Record], with_time: Callable[[float], Cascade], time: float) -> float:
+    """Deviation of a time of a controller [s], by what is left and how the torque changes with it.
 
     With what a velocity that goes straight between the lines would move it by.
     """
-    time = best.velocity.tracking_time
-    if time is None:
-        return 0.0
+    best = with_time(time)
 
     def made(at: float, straight: bool = False) -> Vector:
-        one = replace(best, velocity=replace(best.velocity, tracking_time=at))
+        one = with_time(at)
         return np.concatenate([log_of(r, len(r), one, True).made(one, straight) for r in records])
 
     slope = (made(time * NEXT_TIME) - made(time / NEXT_TIME)) / (time * NEXT_TIME - time / NEXT_TIME)

@@ -17,12 +17,14 @@ from gaident.models.effect_rows import end_words
 from gaident.models.effects import row_of
 from gaident.policy.table import POLICY
 from gaident.results.estimate import Estimate
+from gaident.results.finding import Finding
 
 __all__ = [
     "ON_A_SPRING",
     "basis_of",
     "closer_numbers",
     "closest",
+    "not_borne_out",
     "evidence_of",
     "far_off",
     "hidden_by_torque_noise",
@@ -79,6 +81,16 @@ def basis_of(found: Selection, left: bool) -> list[Text]:
         depends = "" if left else ", but depends on no signal of these records beyond chance"
         return [Text(f"What the model leaves is more than noise{depends}: the parameters are those of least output error.")]
     return [Text("A noise model would take a cause for noise here: the parameters are those of least output error.")]
+
+
+def not_borne_out(named: Sequence[Finding], kept: Sequence[Finding]) -> Text:
+    """Note on what the torque alone shows of the controller, and the model of the axis does not."""
+    lost = [f.effect for f in named if f.effect not in {k.effect for k in kept}] or [f.effect for f in named]
+    text = (
+        "From the logged {torque} alone a controller with another {} came closer, as what the log lost between its lines can "
+        "look like that: no model of the axis leaves noise under it, or as little; one does under the controller that is used."
+    )
+    return say(text, joined(" and ", map(called, lost)))
 
 
 def closest(effects: Sequence[str], driver: str | None, named: bool) -> Text:

@@ -53,7 +53,7 @@ class Dependence:
     @property
     def shares(self) -> dict[str, float]:
         """Part of the squared error before whitening that each driver's family takes away; empty where there is none."""
-        return {d: 1.0 - left / self.rest for d, left in self.unwhitened.items()} if self.rest > 0.0 else {}
+        return {d: max(1.0 - left / self.rest, 0.0) for d, left in self.unwhitened.items()} if self.rest > 0.0 else {}
 
     @property
     def strongest(self) -> str | None:

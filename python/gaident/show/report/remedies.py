@@ -19,6 +19,7 @@ from gaident.show.response_plots import phase_line
 __all__ = ["remedies_section"]
 
 ROLES = {"before": "linear", "after": "extended"}
+HIDDEN = 0.005  # no decision: printed: 0 %
 SPEEDS = 5  # no decision: printed: speeds of each direction
 
 
@@ -172,7 +173,7 @@ def _table_of(found: Mended, axis: str) -> Html:
         return what, number(error), None if math.isnan(fall) else typeset(f"{round(100.0 * fall) + 0:d}")
 
     rows: list[Row] = [("as it is", number(found.now), None)]
-    hidden = any(round(100.0 * (1.0 - error / found.now)) == 0 for error in found.without.values()) if found.now > 0.0 else False
+    hidden = found.now > 0.0 and any(abs(error / found.now - 1.0) < HIDDEN for error in found.without.values())
     if found.retuned is not None:
         rows.append(row("with the proposed gains", found.retuned))
     twice = [effect for effect, _ in found.without]
