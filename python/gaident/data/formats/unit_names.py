@@ -23,13 +23,19 @@ _PATTERNS = tuple(
 )
 
 
+_CURRENT = re.compile(r"(.*(?i:current|strom|courant|corrente|corriente)(?:.*[^\s_-])?)[\s_-]+(m?A)")
+"""A current in A; in capitals alone, or small letters, A is a phase."""
+
+
 def name_and_unit(name: str) -> tuple[str, str] | None:
     """(name, unit) of a name that ends with one behind a blank, a dash or an underline; None of any other.
 
-    Single letters are no units here: i_a is a phase.
+    Single letters are no units here, but A behind a current: i_a is a phase.
 
     >>> [name_and_unit(name) for name in ("speed_rpm", "pos_cmd_deg", "vel_rad_s", "v_mm_per_s", "torque_pct", "i_a")]
     [('speed', 'rpm'), ('pos_cmd', 'deg'), ('vel', 'rad/s'), ('v', 'mm/s'), ('torque', '%'), None]
+    >>> [name_and_unit(name) for name in ("motor_current_A", "current_a", "MOTOR_CURRENT_A")]
+    [('motor_current', 'A'), None, None]
     """
     if len(name) > LONGEST_NAME:
         return None
@@ -37,7 +43,8 @@ def name_and_unit(name: str) -> tuple[str, str] | None:
         found = pattern.fullmatch(name)
         if found is not None:
             return found[1].strip(), alone.sub(unit, found[2])
-    return None
+    current = _CURRENT.fullmatch(name) if not name.isupper() else None
+    return None if current is None else (current[1].strip(), current[2])
 
 
 def unit_of(name: str) -> str | None:
