@@ -169,6 +169,7 @@ def diagnose(
         note(0.02, "identifying the linear model")
 
         linear_under: dict[int, tuple[Driving, Identification]] = {}
+        discarded: list[Text] = []  # what the torque alone shows of the controller, and the model does not
 
         def identified(driving: Driving) -> Identification:
             """The linear model under a controller, identified once."""
@@ -209,6 +210,7 @@ def diagnose(
 
         def under_best_controller(most: int, idn: Identification | None) -> Work:
             """The work with at most so many effects, under the controller with which it explains the records."""
+            discarded.clear()
             work = searched(driving, most, idn)
             if (form := work.other_form()) is not None:
                 note(0.03, "once more, under another form of controller")
@@ -226,7 +228,7 @@ def diagnose(
                     note(0.03, "once more, under a simpler controller")
                     plain = with_rule(searched(beside, most, there), most)
                     if plain.leaves_noise and (not work.leaves_noise or _explains_more(plain, work)):
-                        plain.notes.append(not_borne_out(asked.findings, simpler.findings))
+                        discarded.append(not_borne_out(asked.findings, simpler.findings))
                         work = plain
                         break
             given_work = work
@@ -271,7 +273,7 @@ def diagnose(
         if identification is not None and work.idn is not identification:
             result = replace(result, notes=(IDENTIFIED_AGAIN, *result.notes))
         answered = work.at_controller.decided or any(f.place == "controller" for f in result.findings)
-        result = replace(result, notes=(*driving.notes, *(() if answered else driving.doubts), *result.notes))
+        result = replace(result, notes=(*driving.notes, *discarded, *(() if answered else driving.doubts), *result.notes))
         if bootstrap:
             from gaident.diagnosis.selection.bootstrap import with_p_value
 
