@@ -260,8 +260,10 @@ def behind_a_lag(records: Sequence[Record], validation: Sequence[Record], given:
         return None
     best = minimize_scalar(left, bounds=(grid[k - 1], grid[k + 1]), method="bounded", options={"xatol": LAG_EXACT})
     time, behind, without = float(np.exp(best.x)), float(best.fun), run_error(records, cascade)
+    if not behind < POLICY.each_number * without or not follow(records, lagging(time)):
+        return None
     late = min(_late_by_lines(records, cascade, lines) for lines in range(1, POLICY.log_late + 1))
-    if not behind < min(POLICY.each_number * without, POLICY.better_reason * late) or not follow(records, lagging(time)):
+    if not behind < POLICY.better_reason * late:
         return None
     std = time_std(records, lagging, time)
     if not time > POLICY.check_deviations * std:
