@@ -35,6 +35,7 @@ from numpy.typing import NDArray
 from gaident.axis import Text, joined, say, unit_text
 from gaident.data.record import Record
 from gaident.diagnosis.gains import Gains, interval_of_fall, start_state
+from gaident.diagnosis.inertia_and_angle import inertia_rests_on
 from gaident.diagnosis.library.terms import LIBRARY, level_of
 from gaident.errors import GaidentError
 from gaident.estimation.dataset import DataSet
@@ -71,8 +72,9 @@ class Check:
     """The second method's answer: what it found, its force error [N m], the comparison, before and after with their force errors.
 
     regression_better: whether the regression leaves less torque, beyond the variation over blocks of the held-out data.
-    notes: contradictions, in words. reason: why the force error is the figure to go by on this axis, in words; empty where the
-    free run is as good a figure. loses: whether the regression leaves far less, by more than `loses`, and that matters.
+    notes: contradictions, and on what the inertia rests, in words.
+    reason: why the force error is the figure to go by on this axis, in words; empty where the free run is as good a figure.
+    loses: whether the regression leaves far less, by more than `loses`, and that matters.
     """
 
     regression: InverseDynamics | None
@@ -112,6 +114,8 @@ def checked(data: DataSet, gains: Gains, model: Model, mechanics: Mapping[str, E
     lost = _lost(after, second, better)
     notes = (*notes[:-1], joined("", (notes[-1], verdict))) if notes else lost
     notes = notes if ahead else (*notes, *_smaller(comparisons))
+    if not any(c.name in ("gravity", "ground stiffness") and c.diagnosis.value != 0.0 for c in comparisons):
+        notes += inertia_rests_on(found, records)
     return Check(found, second, comparisons, before, after, notes, _reason(effects, driven), better, bool(lost))
 
 

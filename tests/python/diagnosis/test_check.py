@@ -14,6 +14,7 @@ from drive_rig import Plant, rig, skip_without_library
 from gaident.axis import said
 from gaident.diagnosis.check import Check, _contradicts, _of_the_filter, _smaller_sentence, checked
 from gaident.diagnosis.gains import Gains
+from gaident.diagnosis.inertia_and_angle import inertia_rests_on
 from gaident.estimation.dataset import DataSet
 from gaident.estimation.regression.force_error import FilteredRecords
 from gaident.results.diagnosis import Fitness
@@ -253,3 +254,31 @@ def test_a_diagnosis_carries_it_and_its_file_too(tmp_path: Any) -> None:
     assert back.regression_force_error == dia.regression_force_error
     assert back.regression.to_dict() == dia.regression.to_dict()
     assert replace(back, seconds=0.0).summary() == replace(dia, seconds=0.0).summary()
+
+
+@pytest.mark.parametrize(("axis", "term"), [("rotary", "gravity"), ("linear", "a spring to ground")])
+def test_one_sine_leaves_the_inertia_open_to_a_torque_of_the_angle(axis: Any, term: str):
+    # a = -omega^2 theta on one sine, so that an inertia and a spring, or a small part of a turn of gravity, are one torque
+    def notes(*omegas: float) -> list[str]:
+        t, rng = 0.01 * np.arange(4000), np.random.default_rng(3)
+        angle, w, a = (sum(f(x, t) for x in omegas) for f in (_angle, _velocity, _acceleration))
+        torque = 0.5 * a + 3.0 * w + 2.5 * np.sign(w) + 0.05 * rng.standard_normal(len(t))
+        rec = ga.Record(0.01, velocity=w, torque=torque, position=angle)
+        return [said(n, axis) for n in inertia_rests_on(ga.inverse_dynamics(rec, axis=axis), [rec])]
+
+    (told,) = notes(0.6)
+    thing = "mass" if axis == "linear" else "inertia"
+    assert f"With {term} left open the inverse-dynamics regression finds the {thing} as " in told
+    assert not notes(0.6, 2.1)
+
+
+def _angle(omega: float, t: np.ndarray) -> np.ndarray:
+    return -0.48 / omega * np.cos(omega * t)
+
+
+def _velocity(omega: float, t: np.ndarray) -> np.ndarray:
+    return 0.48 * np.sin(omega * t)
+
+
+def _acceleration(omega: float, t: np.ndarray) -> np.ndarray:
+    return 0.48 * omega * np.cos(omega * t)
