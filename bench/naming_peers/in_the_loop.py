@@ -25,7 +25,7 @@ from gaident.diagnosis.gains import with_effects
 from gaident.diagnosis.library.sides import name_of
 from gaident.diagnosis.note import Note
 from gaident.diagnosis.selection.bases import Task
-from gaident.diagnosis.selection.score_test import ScoreTest
+from gaident.diagnosis.selection.screening.score_test import ScoreTest
 from gaident.diagnosis.work import Work
 from gaident.estimation import least_squares as ls
 from gaident.estimation.noise_model import WHITE

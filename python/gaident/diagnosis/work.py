@@ -25,6 +25,7 @@ from gaident.diagnosis.explain.determined import determined, not_determined
 from gaident.diagnosis.explain.ends import ends_of
 from gaident.diagnosis.explain.held_out import standing
 from gaident.diagnosis.explain.late_inside import late_inside
+from gaident.diagnosis.explain.not_there import bounds_of
 from gaident.diagnosis.explain.verdict import verdict_of
 from gaident.diagnosis.explain.wording import (
     ON_A_SPRING,
@@ -338,6 +339,7 @@ class Work:
             comparisons=check.comparisons,
             relevance=relevance_of(check.after, gains.floor, driver, self.left, self.under, self.estimate, mechanics),
             force_reason=check.reason,
+            not_there=bounds_of(self.found.space, self.final, answered) if driver is None else {},
             notes=tuple(self.notes),
             identification=self.idn,
             controller=self.controller,

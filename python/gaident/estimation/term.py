@@ -87,6 +87,7 @@ class Term:
     components: int = 0  # the first of the two coordinates that these columns belong to
     orders: tuple[int, int] = (1, 1)  # lowest and highest order of a harmonic, or the number of frequencies of a sine of the time
     neutral: Callable[[float, Scales], tuple[float, ...]] | None = None  # the nested effect of this level as this one
+    from_nothing: bool = False  # its first parameter is its size: at 0 there is no effect
     proportional: bool = False  # its torque is proportional to its one coordinate
     multimodal: bool = False  # one stop or impact more makes another local minimum: fitted in the loop first, searched globally
     domains: frozenset[str] = frozenset()  # signals whose free function imitates it

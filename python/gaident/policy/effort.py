@@ -108,7 +108,7 @@ class Effort:
     )
     searched_share: int = effort(64, "1", "samples of long records, of which a model is searched in one")
     most_samples: int = effort(
-        1 << 16, "samples", "in which a model is searched at most, or to which a law of the torque is fitted"
+        1 << 16, "samples", "in which a model is searched at most, a law of the torque fitted, or what was not found bounded"
     )
     aligned_samples: int = effort(1 << 15, "samples", "of two logs, by which their offset is looked for at first")
     lag_samples: int = effort(1 << 17, "samples", "of a record, from which the lag of its torque is estimated")

@@ -215,6 +215,12 @@ class Decisions:
         "of the torque's rms: a smaller difference of friction, gravity, spring at half the travel or force error is immaterial",
         REAL,
     )
+    opened: float = check(
+        5.0, "1", "times the inertia's deviation with gravity left open: above, a note says on what the inertia rests", REAL
+    )
+    not_there: float = check(
+        2.0, "1", "standard deviations above its size as estimated: an effect that was not found is at most so large", REAL
+    )
     velocity_part: float = check(
         0.95,
         "1",

@@ -2,7 +2,7 @@ from .adequacy import Adequacy
 from .diagnosis import Diagnosis
 from .estimate import Estimate
 from .experiment import Limits, Proposal
-from .finding import Finding
+from .finding import Bound, Finding
 from .fitness import Comparison, Fitness
 from .frequency import AveragedResponse, Responses
 from .identification import Identification
@@ -14,6 +14,7 @@ from .store import load, schema
 
 __all__ = [
     "Adequacy",
+    "Bound",
     "Comparison",
     "Diagnosis",
     "Estimate",

@@ -16,7 +16,7 @@ from gaident.models.model import Model
 from gaident.providers import picture, provided
 from gaident.results.estimate import Estimate
 from gaident.results.experiment import Proposal
-from gaident.results.finding import Finding, finding_of, where
+from gaident.results.finding import Bound, Finding, finding_of, where
 from gaident.results.fitness import IN_SAMPLE, Comparison, Fitness
 from gaident.results.identification import Identification
 from gaident.results.inverse_dynamics import InverseDynamics
@@ -31,6 +31,13 @@ __all__ = ["Diagnosis"]
 
 SCHEMA = "gaident/diagnosis"
 SCHEMA_VERSION = 1  # no decision: a format: its version
+WORK = ("seed", "seconds", "simulations", "samples")
+PARTS = ("model", "identification", "next_experiment", "controller", "regression", "linear_model", "relevance")
+SINCE_0_1: Mapping[str, Any] = {
+    **{"noise": None, "bootstrap": 0, "torque_logged": False, "loop_follows": True, "velocity_age": 0.0},
+    **{"regression_force_error": None, "left_needed": 0.0, "axis": "rotary"},
+}
+"""Plain fields that files of gaident 0.1.0 may lack -> what they are there."""
 
 
 @dataclass(frozen=True, repr=False)
@@ -101,6 +108,11 @@ class Diagnosis(WhatIf):
         Effect that was tested and not found -> which sizes of it would not have shown in these records.
     mechanics : mapping of str to Estimate
         Mechanical parameters of the linear part, fitted together with the effects.
+    not_there : mapping of str to Bound
+        Effect that was tested and not found -> how large it may be at most; {} where something significant is left, in files of
+        gaident 0.1.0, and of more than 65 536 samples.
+    expected : mapping of str to tuple of float
+        What was expected of the mechanism, as it was given to `diagnose`: name -> (lowest, highest), in SI.
     velocity_age : float
         Lines of the log by which the measured velocity is older than the torque: 0.5 where it is an encoder's difference.
     log_shifts : mapping of str to mapping of str to int
@@ -173,6 +185,8 @@ class Diagnosis(WhatIf):
     relevance: Relevance | None = None
     covariance: tuple[tuple[float, ...], ...] | None = None
     linear_model: Model | None = None
+    not_there: Mapping[str, Bound] = field(default_factory=dict, hash=False)
+    expected: Mapping[str, tuple[float, float]] = field(default_factory=dict, hash=False)
     records: tuple[Record, ...] = field(default=(), compare=False, repr=False)
     validation_records: tuple[Record, ...] = field(default=(), compare=False, repr=False)
 
@@ -299,7 +313,6 @@ class Diagnosis(WhatIf):
 
     def to_dict(self) -> dict[str, Any]:
         """Return plain data for JSON, without the records."""
-        proposal = self.next_experiment
         return {
             "schema": SCHEMA,
             "schema_version": SCHEMA_VERSION,
@@ -310,31 +323,25 @@ class Diagnosis(WhatIf):
                 for f in self.findings
             ],
             "not_testable": dict(self.not_testable),
-            "model": self.model.to_dict(),
             "before": asdict(self.before),
             "after": asdict(self.after),
             "driver": self.driver,
-            "next_experiment": None if proposal is None else proposal.to_dict(),
+            **{name: None if (part := getattr(self, name)) is None else part.to_dict() for name in PARTS},
             "gain_interval": list(self.gain_interval),
             "held_out": self.held_out,
             "base_shift": {n: list(v) for n, v in self.base_shift.items()},
             "left": dict(self.left),
             "notes": list(self.notes),
-            "identification": self.identification.to_dict(),
-            "controller": None if self.controller is None else self.controller.to_dict(),
-            **{name: getattr(self, name) for name in ("seed", "seconds", "simulations", "samples")},
+            **{name: getattr(self, name) for name in (*WORK, *SINCE_0_1)},
             **{name: list(getattr(self, name)) for name in ("digests", "validation_digests")},
-            **{name: getattr(self, name) for name in ("noise", "bootstrap", "torque_logged", "loop_follows")},
             "line": None if self.line is None else list(self.line),
             "one_sided": dict(self.one_sided),
-            "velocity_age": self.velocity_age,
+            "not_there": {effect: asdict(bound) for effect, bound in self.not_there.items()},
+            "expected": {name: list(of) for name, of in self.expected.items()},
             "log_shifts": {digest: dict(moves) for digest, moves in self.log_shifts.items()},
             "mechanics": {n: asdict(e) for n, e in self.mechanics.items()},
-            "regression": None if self.regression is None else self.regression.to_dict(),
             "comparisons": [asdict(c) for c in self.comparisons],
-            **{name: getattr(self, name) for name in ("regression_force_error", "force_reason", "left_needed", "axis")},
-            "linear_model": None if self.linear_model is None else self.linear_model.to_dict(),
-            "relevance": None if self.relevance is None else self.relevance.to_dict(),
+            "force_reason": self.force_reason,
             "controller_numbers": {name: asdict(e) for name, e in self.controller_numbers.items()},
             "covariance": None if self.covariance is None else [list(row) for row in self.covariance],
             "linear_axis": linear_sentences(self._sentences()),
@@ -370,29 +377,21 @@ class Diagnosis(WhatIf):
                 notes=tuple(restored(note, linear) for note in data["notes"]),
                 identification=Identification.from_dict(data["identification"]),
                 controller=None if data["controller"] is None else controller_of(data["controller"]),
-                seed=data["seed"],
-                seconds=data["seconds"],
-                simulations=data["simulations"],
-                samples=data["samples"],
+                **{name: data[name] for name in WORK},
+                **{name: data.get(name, lacking) for name, lacking in SINCE_0_1.items()},
                 digests=tuple(data["digests"]),
                 version=data["gaident_version"],
                 # Files of gaident 0.1.0 may lack these.
                 validation_digests=tuple(data.get("validation_digests", ())),
-                noise=data.get("noise"),
-                bootstrap=data.get("bootstrap", 0),
-                torque_logged=data.get("torque_logged", False),
-                loop_follows=data.get("loop_follows", True),
                 line=None if data.get("line") is None else (data["line"][0], data["line"][1]),
-                velocity_age=data.get("velocity_age", 0.0),
                 log_shifts=data.get("log_shifts", {}),
                 one_sided={effect: restored(sizes, linear) for effect, sizes in data.get("one_sided", {}).items()},
                 mechanics={n: Estimate(**e) for n, e in data.get("mechanics", {}).items()},
                 regression=None if data.get("regression") is None else InverseDynamics.from_dict(data["regression"]),
-                regression_force_error=data.get("regression_force_error"),
                 comparisons=tuple(map(Comparison.from_dict, data.get("comparisons", ()))),
                 force_reason=restored(data.get("force_reason", ""), linear),
-                left_needed=data.get("left_needed", 0.0),
-                axis=data.get("axis", "rotary"),
+                not_there={effect: Bound(**bound) for effect, bound in data.get("not_there", {}).items()},
+                expected={name: (of[0], of[1]) for name, of in data.get("expected", {}).items()},
                 relevance=None if data.get("relevance") is None else Relevance.from_dict(data["relevance"]),
                 covariance=rows_of(data.get("covariance")),
                 linear_model=None if data.get("linear_model") is None else Model.from_dict(data["linear_model"]),

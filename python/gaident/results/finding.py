@@ -12,7 +12,7 @@ from gaident.models.effects import table
 from gaident.models.model import Model
 from gaident.results.estimate import Estimate
 
-__all__ = ["Finding", "finding_of", "where"]
+__all__ = ["Bound", "Finding", "finding_of", "where"]
 
 
 @dataclass(frozen=True)
@@ -68,6 +68,29 @@ class Finding:
     def named(self) -> bool:
         """Whether the cause is named, without an alternative."""
         return not self.alternatives
+
+
+@dataclass(frozen=True)
+class Bound:
+    """How large an effect may be that was not found.
+
+    Attributes
+    ----------
+    parameter : str
+        The parameter that is its size, as in `gaident.effects.table()`.
+    at_most : float
+        A larger one would have shown: estimate plus two standard deviations, beside all other parameters, in the axis' unit.
+    unit : str
+        Its unit, on a rotary axis.
+
+    See Also
+    --------
+    Diagnosis.not_there : Where they stand.
+    """
+
+    parameter: str
+    at_most: float
+    unit: str
 
 
 def where(finding: Finding, model: Model) -> str:

@@ -65,6 +65,9 @@ def _on_linear(x: Any, sentences: Mapping[str, str], name: str, of_model: bool) 
             return x
         e = of_axis(name, Estimate(x["value"], x["std"], x["unit"]), "linear")
         return {**x, "value": e.value, "std": e.std, "unit": e.unit}
+    if {"parameter", "at_most", "unit"} <= x.keys():
+        e = of_axis(x["parameter"], Estimate(x["at_most"], 0.0, x["unit"]), "linear")
+        return {**x, "at_most": e.value, "unit": e.unit}
     if {"value", "low", "high", "unit"} <= x.keys():
         return {**x, "unit": unit(x["unit"], "linear")}
     known = {**sentences, **x.get("linear_axis", {})}

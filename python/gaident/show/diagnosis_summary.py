@@ -45,7 +45,9 @@ from gaident.show.wording import (
 )
 
 __all__ = [
+    "NOT_THERE",
     "TESTED_UP_TO",
+    "bound_rows",
     "chance_words",
     "cleared_words",
     "diagnosis_summary",
@@ -54,10 +56,12 @@ __all__ = [
     "mechanical_name",
     "moved_words",
     "next_words",
+    "no_experiment_words",
     "parameter_row",
     "verdict_words",
 ]
 
+NOT_THERE = "Not there: a larger one would have shown"
 TESTED_UP_TO = "Tested up to what these records asked for"
 DRIVERS = {
     "velocity": "on the velocity",
@@ -67,6 +71,17 @@ DRIVERS = {
     "time": "on time",
     "past": "on the path before (hysteresis, play, elasticity)",
 }
+
+
+MOTIONS = {
+    "velocity": "Held speeds, slow ones and fast ones in both directions, show the {torque} over the speed",
+    "position": "One slow held speed over the whole travel, there and back, shows the {torque} over the {angle}",
+    "torque": "The same moves with other accelerations, or with another load, show what grows with the {torque}",
+    "command": "The same moves with other command ramps show what the controller adds",
+    "time": "The same moves repeated, after a pause and warm, show what returns with the motion and what moves with time",
+    "past": "Slow reversals after long and short ways, at one place, show what depends on the path before",
+}
+"""Driver of what is left -> the motion that shows it."""
 
 
 def diagnosis_summary(dia: Diagnosis, axis: str = "rotary", units: Mapping[str, str | float] | None = None) -> str:
@@ -87,6 +102,7 @@ def diagnosis_summary(dia: Diagnosis, axis: str = "rotary", units: Mapping[str, 
         controller_lines(dia.controller_numbers, axis),
         _base(dia, axis),
         _record(dia, axis),
+        _not_there(dia, axis, scales),
         _untested(dia, axis),
         _tested_up_to(dia, axis),
         _how(dia),
@@ -308,6 +324,21 @@ def _untested(dia: Diagnosis, axis: str) -> list[str]:
     return ["Not testable with this record", *lines] if lines else []
 
 
+def bound_rows(dia: Diagnosis, axis: str, scales: Scales) -> list[tuple[str, ...]]:
+    """(effect, its size at most, unit, the same in the user's unit) of what was tested and not found."""
+    rows: list[tuple[str, ...]] = []
+    for effect, bound in dia.not_there.items():
+        size = of_axis(bound.parameter, Estimate(bound.at_most, 0.0, bound.unit), axis)
+        u, more = "" if size.unit == "1" else size.unit, beside(scales, bound.parameter, size.value, None, size.unit)
+        rows.append((words(effect, axis), identifier_words(bound.parameter, axis), number(size.value, 2), u, more))
+    return rows
+
+
+def _not_there(dia: Diagnosis, axis: str, scales: Scales) -> list[str]:
+    rows = bound_rows(dia, axis, scales)
+    return [NOT_THERE, *table([(name, f"{size} below", *most) for name, size, *most in rows])] if rows else []
+
+
 def _tested_up_to(dia: Diagnosis, axis: str) -> list[str]:
     lines = []
     for effect, sizes in dia.one_sided.items():
@@ -318,10 +349,24 @@ def _tested_up_to(dia: Diagnosis, axis: str) -> list[str]:
 def _next(dia: Diagnosis, axis: str) -> list[str]:
     p = dia.next_experiment
     if p is None:
-        return []
+        return ["Next experiment", *_wrapped(no_experiment_words(dia, axis), "  ")]
     driving = "command" if p.position_command is None else "position command"
     size = f"The {driving}: {len(p.command)} samples of {1e3 * p.dt:.4g} ms, {len(p.command) * p.dt:.3g} s."
     return ["Next experiment", *_wrapped(said(next_words(dia, p), axis), "  "), f"  {size}"]
+
+
+def no_experiment_words(dia: Diagnosis, axis: str) -> str:
+    """Why no command is proposed, and which motion would show what is left."""
+    if any(f.alternatives for f in dia.findings):
+        return "None is proposed: see the notes under the verdict."
+    if dia.verdict in ("adequate", "explained"):
+        needed = "to explain this record" if dia.verdict == "adequate" else "to name the cause"
+        more = "; what could not be tested needs motions that this record has not" if dia.not_testable or dia.one_sided else ""
+        return f"None is needed {needed}{more}."
+    why = "None of the menu is proposed: its commands tell two causes of the library apart, and none are open here."
+    if dia.driver is None:
+        return why
+    return said(say("{} {}.", why, say(MOTIONS[dia.driver])), axis)
 
 
 def next_words(dia: Diagnosis, p: Proposal) -> Text:

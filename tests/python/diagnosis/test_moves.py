@@ -19,10 +19,11 @@ from scipy.stats import chi2
 import gaident as ga
 from gaident.control.controller import Limiting
 from gaident.diagnosis.library.cause import Cause
-from gaident.diagnosis.selection import mechanisms, model_space, moves, noise_level, rivals, score_test, select, side_moves
+from gaident.diagnosis.selection import mechanisms, model_space, moves, noise_level, rivals, select, side_moves
 from gaident.diagnosis.selection.bases import Task
 from gaident.diagnosis.selection.bootstrap import largest_gains
 from gaident.diagnosis.selection.rivals import Replacement, rivals_of
+from gaident.diagnosis.selection.screening import score_test
 from gaident.diagnosis.selection.select import specification
 from gaident.estimation import least_squares as ls
 from gaident.estimation import prediction

@@ -8,7 +8,7 @@ import pytest
 import gaident as ga
 from fine_integrator import FineCase, integrate
 from gaident.diagnosis.library.terms import LIBRARY
-from gaident.diagnosis.selection.score_test import ScoreTest
+from gaident.diagnosis.selection.screening.score_test import ScoreTest
 from gaident.estimation.dataset import DataSet
 from gaident.estimation.load_end import LoadEnd
 from gaident.estimation.noise_model import WHITE

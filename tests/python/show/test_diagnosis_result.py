@@ -20,7 +20,7 @@ from gaident.diagnosis.explain.evidence import velocity_curve
 from gaident.diagnosis.explain.wording import evidence_of
 from gaident.errors import GaidentError, RecordError, SettingsError
 from gaident.results.diagnosis import Comparison, Fitness
-from gaident.results.finding import Finding
+from gaident.results.finding import Bound, Finding
 from gaident.results.relevance import Relevance
 from gaident.show.report.diagnosis import headline
 from gaident.show.wording import certainty, step_words
@@ -102,6 +102,7 @@ def fake() -> Any:
         driver="time",
         left={"velocity": -20.0, "time": 60.0},
         left_needed=47.0,
+        not_there={"cogging": Bound("amplitude", 0.0042, "N m")},
         next_experiment=ga.Proposal(np.zeros(2000), DT, ("cogging", "velocity_ripple"), 412.3, "Slow speeds: several turns."),
         gain_interval=(0.55, 0.64),
         held_out="validation records",

@@ -26,6 +26,7 @@ CAUSES: tuple[Cause, ...] = (
         lambda s: tuple(s.torque * np.geomspace(0.003, 0.3, 7)),
         domains=OF_THE_TORQUE,
         needs=(t.torque_near_zero,),
+        from_nothing=True,
         excited_by=("slow stairs", "reversals", "random signal at standstill", "creep below break-away"),
         alike={NO_REVERSAL: ("constant torque",)},
     ),
@@ -33,12 +34,14 @@ CAUSES: tuple[Cause, ...] = (
         "transport_delay", "actuator", "delay", lambda s: 0.02 * s.log_dt, lambda s: 10.0 * s.log_dt,
         lambda s: tuple(s.log_dt * np.array([0.3, 0.7, 1.0, 1.5, 2.2, 3.2, 4.5, 7.0])),
         needs=(t.torque_changes,),
+        from_nothing=True,
         excited_by=("random signal at speed",),
     ),
     single(
         "torque_lag", "actuator", "time_constant", lambda s: 0.02 * s.log_dt, lambda s: 30.0 * s.log_dt,
         lambda s: tuple(s.log_dt * np.geomspace(0.25, 16.0, 6)),
         needs=(t.torque_changes,),
+        from_nothing=True,
         excited_by=("random signal at speed",),
     ),
 )  # fmt: skip

@@ -20,6 +20,7 @@ CAUSES: tuple[Cause, ...] = (
         domains=AT_THE_SHAFT,
         excludes=frozenset({"extra_resonance"}),
         needs=(t.moves, t.torque_reverses, t.shaft_resonates),
+        from_nothing=True,
         excited_by=("reversals", "random signal at standstill"),
     ),
     single(

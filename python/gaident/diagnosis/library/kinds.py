@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -58,6 +59,7 @@ def linear(effect: str, name: str, low: Callable[[Scales], float], high: Callabl
         lambda s: [(v,) for v in starts(s)],
         lambda s: (step(s),),
         proportional=True,
+        from_nothing=True,
         **known,
     )
 
@@ -85,6 +87,7 @@ def tone(effect: str, **known: Any) -> Cause:
         lambda s: [],
         lambda s: (0.05 * s.torque, 0.05 * s.torque, 0.02 / s.duration),
         in_time=True,
+        from_nothing=True,
         scales={"phase": PHASE},
         **known,
     )
@@ -121,4 +124,5 @@ def harmonic(effect: str, place: str, first: int, with_order: bool, kind: str, *
         return (a, a, order)[: 3 if with_order else 2]
 
     turning = {"phase": PHASE}
-    return Cause(effect, place, natural, coordinates, limits, lambda s: [], steps, harmonic=kind, scales=turning, **known)
+    row = Cause(effect, place, natural, coordinates, limits, lambda s: [], steps, harmonic=kind, scales=turning, **known)
+    return replace(row, from_nothing=True)

@@ -37,6 +37,7 @@ CAUSES: tuple[Cause, ...] = (
         seen_angle=_behind_filter,
         late=True,
         excludes=OTHERS["velocity_filter"],
+        from_nothing=True,
         excited_by=("random signal at speed",),
     ),
     single(

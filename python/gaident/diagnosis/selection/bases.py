@@ -15,7 +15,7 @@ from gaident.diagnosis.selection.attribution import shown_without_model
 from gaident.diagnosis.selection.mechanisms import is_mechanism, on_no_shaft, one_mass, reduced, resonant, rigid, swings
 from gaident.diagnosis.selection.model_space import Grown
 from gaident.diagnosis.selection.moves import MISSED, Moves
-from gaident.diagnosis.selection.score_test import ScoreTest
+from gaident.diagnosis.selection.screening.score_test import ScoreTest
 from gaident.errors import GaidentError, RecordError, SettingsError
 from gaident.estimation import least_squares as ls
 from gaident.estimation.criterion import effective_samples, gained

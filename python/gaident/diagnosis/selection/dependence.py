@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gaident.control.filtering import clamped_sum
-from gaident.diagnosis.selection.spectrum import lines
+from gaident.diagnosis.selection.screening.spectrum import lines
 from gaident.estimation.criterion import cost_of
 from gaident.estimation.least_squares import scored
 from gaident.estimation.noise_model import WHITE, ShaftNoise

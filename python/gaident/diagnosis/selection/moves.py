@@ -42,7 +42,7 @@ from gaident.diagnosis.selection.mechanisms import (
 )
 from gaident.diagnosis.selection.model_space import words
 from gaident.diagnosis.selection.repeated import Repeated
-from gaident.diagnosis.selection.score_test import ScoreTest
+from gaident.diagnosis.selection.screening.score_test import ScoreTest
 from gaident.diagnosis.selection.side_moves import better_sides
 from gaident.estimation import least_squares as ls
 from gaident.estimation.criterion import gained

@@ -10,7 +10,7 @@ import numpy as np
 from gaident.diagnosis.library.terms import LIBRARY
 from gaident.diagnosis.selection.mechanisms import moved_to, resonance, shafts
 from gaident.diagnosis.selection.model_space import ModelSpace
-from gaident.diagnosis.selection.score_test import Screened
+from gaident.diagnosis.selection.screening.score_test import Screened
 from gaident.estimation import least_squares as ls
 from gaident.estimation.noise_model import WHITE
 from gaident.estimation.objective import Fit, Hypothesis

@@ -13,13 +13,16 @@ from gaident.results.diagnosis import Diagnosis
 from gaident.results.estimate import Estimate
 from gaident.results.finding import Finding
 from gaident.show.diagnosis_summary import (
+    NOT_THERE,
     TESTED_UP_TO,
+    bound_rows,
     chance_words,
     cleared_words,
     left_words,
     mechanical_name,
     moved_words,
     next_words,
+    no_experiment_words,
     parameter_row,
 )
 from gaident.show.gain_words import digits_apart
@@ -243,6 +246,10 @@ def _untested(dia: Diagnosis, view: View) -> Section:
         parts += [tag("p", text), _reasons(dia.not_testable, "why", view.axis)]
     else:
         parts.append(tag("p", "Every effect of the library could have shown itself in this record."))
+    if rows := bound_rows(dia, view.axis, view.scales):
+        text = "These were tested and not found. A larger one than stands here would have shown, at 98 %."
+        shown: list[Row] = [(name, size, most, typeset(u), typeset(more)) for name, size, most, u, more in rows]
+        parts += [tag("h3", NOT_THERE), tag("p", text), table(("effect", "its size", "at most", "", ""), [shown])]
     if dia.one_sided:
         text = "These were looked for and not found, but of some sizes they would not have shown."
         parts += [tag("h3", TESTED_UP_TO), tag("p", text), _reasons(dia.one_sided, "what would not have shown", view.axis)]
@@ -260,13 +267,7 @@ def _next(dia: Diagnosis, view: View, drawn: Charts) -> Section:
     p = dia.next_experiment
     axis = view.axis
     if p is None:
-        text = {
-            "adequate": "None is needed to explain this record; what could not be tested needs motions that this record has not.",
-            "explained": "None is needed: the cause is named.",
-        }.get(dia.verdict, "None is proposed: no experiment of the menu is known to help.")
-        if any(f.alternatives for f in dia.findings):
-            text = "None is proposed: see the notes under the verdict."
-        return Section("next", title, tag("p", text))
+        return Section("next", title, tag("p", no_experiment_words(dia, axis)))
     low, high = p.reach
     v, place = velocity_unit(axis), unit("rad", axis)
     size = {
