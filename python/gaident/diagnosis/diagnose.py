@@ -18,7 +18,7 @@ from gaident.diagnosis.controller.as_read import in_terms_of_the_log, outliers_o
 from gaident.diagnosis.controller.driving import Driving, driving_of
 from gaident.diagnosis.controller.form_findings import Loop, loop_of
 from gaident.diagnosis.controller.joint_numbers import better_under
-from gaident.diagnosis.explain.expected import outside_of
+from gaident.diagnosis.explain.expected import FOUND_AS, outside_of
 from gaident.diagnosis.explain.wording import not_borne_out
 from gaident.diagnosis.gains import judges_selected
 from gaident.diagnosis.note import Note
@@ -270,6 +270,7 @@ def diagnose(
             wanted = replace(result.relevance, velocity_accuracy=velocity, torque_accuracy=torque)
             result = replace(result, relevance=wanted)
         result = replace(result, notes=(*result.notes, *outside_of(ranges, result.mechanics), *((FIRST_CAUSE,) * quick)))
+        result = replace(result, expected={FOUND_AS[name]: limits for name, limits in ranges.items()})
         if identification is not None and work.idn is not identification:
             result = replace(result, notes=(IDENTIFIED_AGAIN, *result.notes))
         answered = work.at_controller.decided or any(f.place == "controller" for f in result.findings)

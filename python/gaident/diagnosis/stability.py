@@ -64,8 +64,9 @@ def stability(
         except GaidentError as error:
             found.append(Variation(what, "", refused=str(error)))
         else:
-            found.append(Variation(what, one.verdict, causes_of(one), tuple(sorted(one.not_testable))))
-    return Stability(dia.verdict, causes_of(dia), tuple(found))
+            sizes = {f.effect: next(iter(f.parameters.values())) for f in one.causes if f.parameters}
+            found.append(Variation(what, one.verdict, causes_of(one), tuple(sorted(one.not_testable)), sizes=sizes))
+    return Stability(dia.verdict, causes_of(dia), tuple(found), dia.axis)
 
 
 def causes_of(dia: Diagnosis) -> tuple[tuple[str, ...], ...]:

@@ -27,7 +27,7 @@ def retuning_summary(result: Retuning, axis: str = "rotary") -> str:
 
 
 def _gains(result: Retuning, axis: str) -> list[str]:
-    rows: list[tuple[str, ...]] = [("", "before", "proposed", ""), *gain_rows(result, axis)]
+    rows: list[tuple[str, ...]] = [("", "before", "proposed", ""), *(row[:4] for row in gain_rows(result, axis, {}))]
     added = [f"  added: {one}" for one in added_filters(result)]
     return ["Gains", *table(rows), *added, *textwrap.wrap(asked_words(result, axis), WIDTH)]
 

@@ -80,7 +80,8 @@ def report(
     live : bool
         False: pictures in place of figures that zoom; a page of some 0.3 MB, to be mailed or printed.
     stability : Stability, optional
-        Of one diagnosis: what `Diagnosis.stability` gave. The page then says how often each cause is named again.
+        Of one diagnosis: what `Diagnosis.stability` gave; None: what is kept with it, `Diagnosis.varied`.
+        The page then says how often each cause is named again.
 
     Raises
     ------
@@ -123,6 +124,8 @@ def report_page(
     if about is not None and not isinstance(about, Mapping):
         raise GaidentError(f"about is {about!r:.80}: give a dictionary of texts, for example {{'machine': 'press 4'}}")
     yes_or_no(live, "live", GaidentError)
+    if stability is None and isinstance(result, Diagnosis):
+        stability = result.varied
     if stability is not None:
         if not isinstance(stability, Stability) or not isinstance(result, Diagnosis):
             raise GaidentError(f"stability is {stability!r:.80}: give what dia.stability() gave of the one diagnosis, or None")

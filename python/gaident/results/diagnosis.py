@@ -11,7 +11,6 @@ from gaident.control.cascade import controller_of
 from gaident.control.controller import Controller
 from gaident.data.record import Record
 from gaident.errors import check_schema
-from gaident.models.drive_torque import as_read, driven_by
 from gaident.models.model import Model
 from gaident.providers import picture, provided
 from gaident.results.estimate import Estimate
@@ -21,8 +20,8 @@ from gaident.results.fitness import IN_SAMPLE, Comparison, Fitness
 from gaident.results.identification import Identification
 from gaident.results.inverse_dynamics import InverseDynamics
 from gaident.results.relevance import Relevance
-from gaident.results.saved import given_record, rows_of, undamaged
-from gaident.results.what_if import WhatIf
+from gaident.results.saved import rows_of, undamaged
+from gaident.results.what_if import Stability, WhatIf
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -32,7 +31,7 @@ __all__ = ["Diagnosis"]
 SCHEMA = "gaident/diagnosis"
 SCHEMA_VERSION = 1  # no decision: a format: its version
 WORK = ("seed", "seconds", "simulations", "samples")
-PARTS = ("model", "identification", "next_experiment", "controller", "regression", "linear_model", "relevance")
+PARTS = ("model", "identification", "next_experiment", "controller", "regression", "linear_model", "relevance", "varied")
 SINCE_0_1: Mapping[str, Any] = {
     **{"noise": None, "bootstrap": 0, "torque_logged": False, "loop_follows": True, "velocity_age": 0.0},
     **{"regression_force_error": None, "left_needed": 0.0, "axis": "rotary"},
@@ -112,7 +111,7 @@ class Diagnosis(WhatIf):
         Effect that was tested and not found -> how large it may be at most; {} where something significant is left, in files of
         gaident 0.1.0, and of more than 65 536 samples.
     expected : mapping of str to tuple of float
-        What was expected of the mechanism, as it was given to `diagnose`: name -> (lowest, highest), in SI.
+        What was expected of the mechanism, as it was given to `diagnose`: name in `mechanics` -> (lowest, highest), in SI.
     velocity_age : float
         Lines of the log by which the measured velocity is older than the torque: 0.5 where it is an encoder's difference.
     log_shifts : mapping of str to mapping of str to int
@@ -134,6 +133,9 @@ class Diagnosis(WhatIf):
         That of the natural parameters of `model`, then of its effects' parameters, in SI; None where the records leave one open.
     axis : {"rotary", "linear"}
         Kind of the axis, as it was given to `diagnose`.
+    varied : Stability or None
+        What `stability` gave, where it was kept with the result: `gaident diagnose --stability --out` does,
+        `dataclasses.replace(dia, varied=dia.stability())` too.
     records, validation_records : tuple of Record
         The data; empty where the diagnosis was loaded from a file.
 
@@ -187,6 +189,7 @@ class Diagnosis(WhatIf):
     linear_model: Model | None = None
     not_there: Mapping[str, Bound] = field(default_factory=dict, hash=False)
     expected: Mapping[str, tuple[float, float]] = field(default_factory=dict, hash=False)
+    varied: Stability | None = None
     records: tuple[Record, ...] = field(default=(), compare=False, repr=False)
     validation_records: tuple[Record, ...] = field(default=(), compare=False, repr=False)
 
@@ -203,30 +206,6 @@ class Diagnosis(WhatIf):
     def in_sample(self) -> bool:
         """Whether the figures of `before` and `after` are of the samples that were fitted: none could be held out."""
         return self.held_out == IN_SAMPLE
-
-    def as_used(self, rec: Record) -> Record:
-        """Return a record as the diagnosis used it.
-
-        That is without the shifts of its log, see `log_shifts`.
-        Without a bare PI its torque is then the one that drove the motor over each line, see docs/controllers.md.
-
-        Parameters
-        ----------
-        rec : Record
-            A record that was given to `diagnose`, or any other, which is returned as it is.
-
-        Returns
-        -------
-        Record
-            The same, or one with its channels moved and its torque and velocity changed.
-
-        Raises
-        ------
-        RecordError
-            Where no torque is logged and this controller makes none of what is.
-        """
-        rec = as_read(given_record(rec), self.controller, self.log_shifts)
-        return rec if self.controller is None or self.controller.one_equation else driven_by(rec, self.controller)
 
     def summary(self, axis: str | None = None, units: Mapping[str, str | float] | None = None) -> str:
         """Return the result as text.
@@ -395,5 +374,6 @@ class Diagnosis(WhatIf):
                 relevance=None if data.get("relevance") is None else Relevance.from_dict(data["relevance"]),
                 covariance=rows_of(data.get("covariance")),
                 linear_model=None if data.get("linear_model") is None else Model.from_dict(data["linear_model"]),
+                varied=None if data.get("varied") is None else Stability.from_dict(data["varied"]),
                 controller_numbers={name: Estimate(**e) for name, e in data.get("controller_numbers", {}).items()},
             )

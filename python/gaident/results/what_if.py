@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict, dataclass, field
 from typing import Any
 
 from gaident.control.controller import Controller
 from gaident.data.record import Record
 from gaident.errors import GaidentError, SettingsError
+from gaident.models.drive_torque import as_read, driven_by
 from gaident.models.model import Model
 from gaident.models.simulate import Run
 from gaident.providers import provided
-from gaident.results.saved import SavedResult
+from gaident.results.estimate import Estimate
+from gaident.results.saved import SavedResult, given_record, undamaged
 
 __all__ = ["Stability", "Variation", "WhatIf"]
 
@@ -35,6 +37,8 @@ class Variation:
         Effects that these records cannot show.
     refused : str
         Why it could not be diagnosed, else "".
+    sizes : mapping of str to Estimate
+        Cause -> its first parameter, the size of most of them.
     """
 
     what: str
@@ -42,6 +46,7 @@ class Variation:
     causes: tuple[tuple[str, ...], ...] = ()
     hidden: tuple[str, ...] = ()
     refused: str = ""
+    sizes: Mapping[str, Estimate] = field(default_factory=dict, hash=False)
 
     def says(self, causes: Sequence[str]) -> str:
         """ "named", "possible" (among others), "not named" or "could not show".
@@ -69,11 +74,14 @@ class Stability:
         Of each cause of the diagnosis its name, then those from which it is not told apart.
     variations : tuple of Variation
         What was varied, and what was found.
+    axis : {"rotary", "linear"}
+        Kind of the axis.
     """
 
     verdict: str
     causes: tuple[tuple[str, ...], ...]
     variations: tuple[Variation, ...]
+    axis: str = "rotary"
 
     def named(self, cause: str) -> tuple[int, int]:
         """(how many variations name a cause of the diagnosis again, how many could show it).
@@ -128,7 +136,28 @@ class Stability:
     def to_dict(self) -> dict[str, Any]:
         """Return plain data for JSON."""
         variations = [{**asdict(v), "causes": list(map(list, v.causes)), "hidden": list(v.hidden)} for v in self.variations]
-        return {"verdict": self.verdict, "causes": list(map(list, self.causes)), "variations": variations}
+        return {"verdict": self.verdict, "causes": list(map(list, self.causes)), "variations": variations, "axis": self.axis}
+
+    @classmethod
+    def from_dict(cls, data: Mapping[str, Any]) -> Stability:
+        """The inverse of `to_dict`. Raises GaidentError where the data are something else."""
+        with undamaged("stability"):
+            return cls(
+                data["verdict"],
+                tuple(map(tuple, data["causes"])),
+                tuple(
+                    Variation(
+                        v["what"],
+                        v["verdict"],
+                        tuple(map(tuple, v["causes"])),
+                        tuple(v["hidden"]),
+                        v["refused"],
+                        {name: Estimate(**e) for name, e in v["sizes"].items()},
+                    )
+                    for v in data["variations"]
+                ),
+                data["axis"],
+            )
 
 
 class WhatIf(SavedResult):
@@ -137,6 +166,31 @@ class WhatIf(SavedResult):
     model: Model
     controller: Controller | None
     velocity_age: float
+    log_shifts: Mapping[str, Mapping[str, int]]
+
+    def as_used(self, rec: Record) -> Record:
+        """Return a record as the diagnosis used it.
+
+        That is without the shifts of its log, see `log_shifts`.
+        Without a bare PI its torque is then the one that drove the motor over each line, see docs/controllers.md.
+
+        Parameters
+        ----------
+        rec : Record
+            A record that was given to `diagnose`, or any other, which is returned as it is.
+
+        Returns
+        -------
+        Record
+            The same, or one with its channels moved and its torque and velocity changed.
+
+        Raises
+        ------
+        RecordError
+            Where no torque is logged and this controller makes none of what is.
+        """
+        rec = as_read(given_record(rec), self.controller, self.log_shifts)
+        return rec if self.controller is None or self.controller.one_equation else driven_by(rec, self.controller)
 
     def simulate_without(self, effect: str, rec: Record | None = None, *, side: str | None = None) -> Run:
         """Simulate the drive as it would be with one cause mended.

@@ -96,9 +96,9 @@ def diagnosis_summary(dia: Diagnosis, axis: str = "rotary", units: Mapping[str, 
         _causes(dia, axis, scales),
         _gain(dia, axis, scales),
         _force(dia, axis, scales),
-        _second_method(dia, axis),
+        _second_method(dia, axis, scales),
         _next(dia, axis),
-        _mechanics(dia, axis),
+        _mechanics(dia, axis, scales),
         controller_lines(dia.controller_numbers, axis),
         _base(dia, axis),
         _record(dia, axis),
@@ -246,16 +246,17 @@ def _force(dia: Diagnosis, axis: str, scales: Scales) -> list[str]:
     return [f"{word('Torque', axis)} error, {where}", *table(rows), *_wrapped(force_words(dia, axis), "  ")]
 
 
-def _second_method(dia: Diagnosis, axis: str) -> list[str]:
+def _second_method(dia: Diagnosis, axis: str, scales: Scales) -> list[str]:
     """The regression beside the diagnosis."""
-    rows = comparison_rows(dia, axis)
+    rows = comparison_rows(dia, axis, scales)
     if not rows:
         return []
-    head = ("", "diagnosis", "regression", "", "")
+    shown = any(row[4] or row[5] for row in rows)
+    head = ("", "diagnosis", "regression", "", *(("diagnosis", "regression") if shown else ("", "")), "")
     return ["Check by inverse-dynamics regression", *table([head, *rows]), *_wrapped(method_words(dia, axis), "  ")]
 
 
-def _mechanics(dia: Diagnosis, axis: str) -> list[str]:
+def _mechanics(dia: Diagnosis, axis: str, scales: Scales) -> list[str]:
     """The linear part of the reported model, by its mechanical parameters."""
     if not dia.mechanics:
         return []
@@ -265,7 +266,8 @@ def _mechanics(dia: Diagnosis, axis: str) -> list[str]:
     rows = []
     for name, e in dia.mechanics.items():
         u = "" if e.unit == "1" else unit(e.unit, axis)
-        rows.append((mechanical_name(name, axis), with_std(e.value, e.std), u, remark_words(dia, name, e)))
+        users = beside(scales, name, e.value, e.std, u)
+        rows.append((mechanical_name(name, axis), with_std(e.value, e.std), u, users, remark_words(dia, name, e)))
     lines = [head, *table(rows)]
     if any(e.std is not None and e.std > 0.0 for e in dia.mechanics.values()):
         lines.append(f"  +- {SPREAD}")

@@ -7,8 +7,9 @@ import math
 from gaident.axis import Text, identifier_words, said, say, unit
 from gaident.policy.table import POLICY
 from gaident.results.diagnosis import Diagnosis
+from gaident.results.estimate import Estimate
 from gaident.results.fitness import Comparison
-from gaident.show.units import Scales, with_column
+from gaident.show.units import Scales, beside, with_column
 from gaident.show.wording import diverges, number, with_std
 
 __all__ = [
@@ -180,19 +181,23 @@ def _force_growth_words(dia: Diagnosis) -> Text:
     return say("{}: what it names is not all that there is.", text)
 
 
-def comparison_rows(dia: Diagnosis, axis: str) -> list[tuple[str, str, str, str, str]]:
-    """(what, by the diagnosis, by the regression, unit, remark); first what is compared, then what else the regression has."""
-    rows = []
+def comparison_rows(dia: Diagnosis, axis: str, scales: Scales) -> list[tuple[str, ...]]:
+    """(what, by the diagnosis, by the regression, unit, both in the user's unit, remark); then what else the regression has."""
+
+    def both(one: Estimate | None, other: Estimate) -> tuple[str, ...]:
+        si = unit(other.unit, axis)
+        users = ("" if e is None else beside(scales, "", e.value, e.std, si) for e in (one, other))
+        return "" if one is None else with_std(one.value, one.std), with_std(other.value, other.std), si, *users
+
+    rows: list[tuple[str, ...]] = []
     for c in dia.comparisons:
         remark = "they disagree" if c.differs else _remark(c)
-        values = with_std(c.diagnosis.value, c.diagnosis.std), with_std(c.regression.value, c.regression.std)
-        rows.append((identifier_words(c.name.replace(" ", "_"), axis), *values, unit(c.regression.unit, axis), remark))
+        rows.append((identifier_words(c.name.replace(" ", "_"), axis), *both(c.diagnosis, c.regression), remark))
     compared = {COMPARED.get(c.name, c.name) for c in dia.comparisons}
     for name, e in dia.regression.parameters.items() if rows and dia.regression is not None else ():
         if name not in compared:
             own = dia.mechanics.get("viscous_friction") if name == "viscous" else None
-            shown = "" if own is None else with_std(own.value, own.std)
-            rows.append((identifier_words(name, axis), shown, with_std(e.value, e.std), unit(e.unit, axis), ""))
+            rows.append((identifier_words(name, axis), *both(own, e), ""))
     return rows
 
 

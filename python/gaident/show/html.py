@@ -72,6 +72,12 @@ def number(value: float, digits: int = 4) -> Html:  # no decision: printed: a nu
     return Html(text.replace("-", "&minus;"))
 
 
+def filled_table(columns: Sequence[str], rows: Sequence[Row]) -> Html:
+    """A table of one block without the columns in which no row has anything."""
+    kept = [k for k in range(len(columns)) if any(row[k] not in ("", None) for row in rows)]
+    return table([columns[k] for k in kept], [[tuple(row[k] for k in kept) for row in rows]])
+
+
 def table(
     columns: Sequence[str], blocks: Sequence[Sequence[Row]], groups: Sequence[tuple[str, int]] = (), left: Sequence[int] = ()
 ) -> Html:

@@ -71,12 +71,13 @@ def bent_of(dia: Diagnosis) -> tuple[str, ...]:
 
 
 def remark_words(dia: Diagnosis, name: str, e: Estimate) -> str:
-    """What stands behind a mechanical value: not determined, or what is left can have bent it, where that is not said of all."""
+    """What stands behind a mechanical value: what was expected, not determined, or bent by what is left, where not all are."""
     bent = bent_of(dia)
     marked = name in bent and len(bent) < len(dia.mechanics)
-    return ", ".join(
-        text for text, there in (("not determined", not e.identifiable), ("may be biased by what is left", marked)) if there
-    )
+    low, high = dia.expected.get(name, (None, None))
+    expected = "" if low is None or high is None else f"expected {number(low)} to {number(high)}"
+    said = ("not determined", not e.identifiable), ("may be biased by what is left", marked)
+    return ", ".join(filter(None, (expected, *(text for text, there in said if there))))
 
 
 def _shown(value: float, si: str, scales: Scales) -> str:

@@ -65,7 +65,20 @@ def scales_of(units: Mapping[str, str | float] | None, axis: str) -> Scales:
         size, si = factor(quantity, wanted, constants), unit_of(rotary, axis)
         if wanted != si:
             found[si] = wanted, 1.0 / size
-    return found
+    return found | _derived(found, axis)
+
+
+def _derived(found: Scales, axis: str) -> dict[str, tuple[str, float]]:
+    """The units of gains and of viscous friction, where a torque has one of the user: % per rpm."""
+    torque = unit_of("N m", axis)
+    if torque not in found:
+        return {}
+    name, size = found[torque]
+    made = {}
+    for rotary, of in (("N m s/rad", "rad/s"), ("N m/rad", "rad")):
+        under, per = found.get(si := unit_of(of, axis), (si, 1.0))
+        made[unit_of(rotary, axis)] = f"{name}/{f'({under})' if '/' in under else under}", size / per
+    return made
 
 
 def beside(scales: Scales, name: str, value: float, std: float | None, si: str) -> str:

@@ -11,7 +11,7 @@ from gaident.results.diagnosis import Diagnosis
 from gaident.results.estimate import Estimate
 from gaident.results.finding import Finding, where
 from gaident.results.fitness import Fitness
-from gaident.results.what_if import Stability
+from gaident.results.what_if import Stability, Variation
 
 __all__ = [
     *(
@@ -172,4 +172,15 @@ def missing_words(finding: Finding, dia: Diagnosis, axis: str) -> str:
 
 def stability_summary(found: Stability) -> str:
     """How often causes are named again: a sentence for each, then a row for each variation."""
-    return "\n".join([*found.sentences, "", *table([("variation", "verdict", "causes"), *found.rows])])
+    rows = [(v.what, v.verdict or "not diagnosed", v.refused or variation_words(v, found.axis)) for v in found.variations]
+    return "\n".join([*found.sentences, "", *table([("variation", "verdict", "causes"), *rows])])
+
+
+def variation_words(v: Variation, axis: str) -> str:
+    """The causes of a variation, each with its size."""
+    causes = []
+    for names in v.causes:
+        e = v.sizes.get(names[0])
+        size = "" if e is None else f" {with_std(e.value, e.std)} {'' if e.unit == '1' else unit(e.unit, axis)}".rstrip()
+        causes.append(" or ".join(names) + size)
+    return ", ".join(causes) or "none"

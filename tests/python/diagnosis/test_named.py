@@ -7,7 +7,7 @@ import pytest
 
 import gaident as ga
 from drive_cases import random_case
-from drive_rig import Noise, Plant, run_drive
+from drive_rig import Noise, Plant, rig, run_drive
 from fine_integrator import FineCase, integrate
 
 CONTROLLER = ga.PI(0.0232, 1.367)
@@ -204,3 +204,45 @@ def test_a_changing_inertia_is_of_the_mechanism_and_has_no_side() -> None:
 @pytest.mark.long
 def test_a_clean_drive_has_none_of_them() -> None:
     assert ga.diagnose(hidden({}), STIFF).causes == ()
+
+
+@pytest.mark.long
+@pytest.mark.parametrize(
+    ("effect", "shape"),
+    [
+        ("quadratic_drag", ("coefficient", {})),
+        ("unbalance", ("amplitude", {"phase": 0.7})),
+        ("transport_delay", ("delay", {})),
+        ("cogging", ("amplitude", {"order": 7.0, "phase": 0.7})),
+    ],
+)
+def test_what_is_not_there_is_below_its_bound_and_what_is_far_above_it_is_found(
+    effect: str, shape: tuple[str, dict[str, float]]
+) -> None:
+    command = np.repeat(np.random.default_rng(5).uniform(-40.0, 40.0, 20), 150)
+    plant, name, others = Plant(J=3e-4, D=1.5e-3, kp=0.03, ki=1.9, dt=DT), *shape
+
+    def found(seed: int, **hidden: dict[str, float]) -> ga.Diagnosis:
+        effects = {"coulomb_friction": {"torque": 0.05}, **hidden}
+        rec = rig(plant, command, effects, noise="white", seed=seed, position_logged=True)
+        return ga.diagnose(rec, ga.PI(plant.kp, plant.ki))
+
+    bound = found(1).not_there[effect]
+    assert bound.parameter == name
+    small, large = 0.2 * bound.at_most, 4.0 * bound.at_most
+    hidden = found(2, **{effect: {name: small, **others}})
+    assert [f.effect for f in hidden.causes] == ["coulomb_friction"]
+    assert small < hidden.not_there[effect].at_most < 4.0 * bound.at_most
+    there = found(3, **{effect: {name: large, **others}})
+    named = [{f.effect, *f.alternatives} for f in there.causes]
+    assert len(named) == 2 and effect in named[1] and effect not in there.not_there, (named, there.not_there)
+
+
+def test_nothing_is_bounded_where_something_is_left() -> None:
+    """What is left may hide an effect, or stand for it."""
+    t = DT * np.arange(3000)
+    command = 20.0 * np.sin(9.0 * t) + 10.0 * np.sin(23.0 * t)
+    plant = Plant(J=3e-4, D=1.5e-3, kp=0.03, ki=1.9, dt=DT)
+    rec = rig(plant, command, {"thermal_gain": {"share": 0.5, "time_constant": 1.0}}, noise="white", seed=4)
+    dia = ga.diagnose(rec, ga.PI(plant.kp, plant.ki))
+    assert dia.driver is not None and dia.not_there == {}

@@ -102,6 +102,7 @@ def fake() -> Any:
         driver="time",
         left={"velocity": -20.0, "time": 60.0},
         left_needed=47.0,
+        expected={},
         not_there={"cogging": Bound("amplitude", 0.0042, "N m")},
         next_experiment=ga.Proposal(np.zeros(2000), DT, ("cogging", "velocity_ripple"), 412.3, "Slow speeds: several turns."),
         gain_interval=(0.55, 0.64),

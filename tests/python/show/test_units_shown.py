@@ -68,8 +68,11 @@ def test_the_units_and_what_they_need() -> None:
         "rad/s": ("rpm", pytest.approx(RPM)),
         "N m": ("%", pytest.approx(100 / 2.4)),
         "rad": ("deg", pytest.approx(180 / np.pi)),
+        "N m s/rad": ("%/rpm", pytest.approx(100 / 2.4 / RPM)),
+        "N m/rad": ("%/deg", pytest.approx(100 / 2.4 * np.pi / 180)),
     }
-    assert scales_of({"velocity": "mm/s", "torque": "kN"}, "linear") == {"m/s": ("mm/s", 1e3), "N": ("kN", 1e-3)}
+    of_force = scales_of({"velocity": "mm/s", "torque": "kN"}, "linear")
+    assert of_force == {"m/s": ("mm/s", 1e3), "N": ("kN", 1e-3), "N s/m": ("kN/(mm/s)", 1e-6), "N/m": ("kN/m", 1e-3)}
     of_screw = scales_of({"velocity": "mm/s", "position": "mm", "screw": 0.01}, "rotary")
     assert of_screw == {"rad/s": ("mm/s", pytest.approx(10.0 / math.tau)), "rad": ("mm", pytest.approx(10.0 / math.tau))}
     with pytest.raises(SettingsError, match="'mm/s', which no rotary axis"):
@@ -93,7 +96,7 @@ def test_a_unit_of_the_other_kind_of_axis_is_refused() -> None:
         quantity = next(iter(wrong))
         with pytest.raises(SettingsError, match=f"{quantity} is .*, which no {axis} axis is measured in: give one of {listed}"):
             scales_of(wrong, axis)
-    assert scales_of({"torque": "%", "rated_torque": 200.0}, "linear") == {"N": ("%", pytest.approx(0.5))}
+    assert scales_of({"torque": "%", "rated_torque": 200.0}, "linear")["N"] == ("%", pytest.approx(0.5))
 
 
 def test_numbers_of_a_linear_axis_bear_its_units(diagnosis: ga.Diagnosis) -> None:

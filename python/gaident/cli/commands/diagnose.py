@@ -5,6 +5,7 @@ from __future__ import annotations
 import sys
 from argparse import Namespace
 from collections.abc import Sequence
+from dataclasses import replace
 from itertools import starmap
 from pathlib import Path
 from typing import Any
@@ -137,6 +138,7 @@ def _diagnosed(args: Namespace) -> tuple[Drive, Diagnosis, Stability | None, lis
             expected=drive.expected,
         )
         shown = dia.stability(records, drive.pitch, progress) if args.stability else None
+        dia = replace(dia, varied=shown)
         written = files.write(dia, records, validation or (), drive, lambda: dia.plot(axis=drive.axis), bar.doing, shown)
     if following is not None and dia.next_experiment is not None:
         write(following, proposal_csv(dia.next_experiment, drive.axis).encode())

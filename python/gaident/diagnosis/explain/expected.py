@@ -12,7 +12,7 @@ from gaident.axis import Text, say, unit_text
 from gaident.policy.table import POLICY
 from gaident.results.estimate import Estimate
 
-__all__ = ["outside_of"]
+__all__ = ["FOUND_AS", "outside_of"]
 
 FOUND_AS = {"inertia": "inertia", "resonance_hz": "resonance", "damping": "viscous_friction"}
 """Of what is expected -> its name among the mechanical parameters."""

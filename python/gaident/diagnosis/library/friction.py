@@ -262,7 +262,7 @@ CAUSES: tuple[Cause, ...] = (
     ),
     linear(
         "quadratic_drag", "coefficient", lambda s: 0.0, lambda s: s.torque / s.speed**2,
-        lambda s: tuple(f * s.torque / s.speed**2 for f in (0.01, 0.05, 0.2)), lambda s: 0.05 * s.torque / s.speed**2,
+        lambda s: tuple(f * s.torque / s.speed**2 for f in (0.001, 0.01, 0.05, 0.2)), lambda s: 0.05 * s.torque / s.speed**2,
         domains=AT_THE_SHAFT,
         curve=lambda w, p: -p["coefficient"] * w * np.abs(w),
         needs=(t.moves, t.several_speeds),
@@ -272,7 +272,7 @@ CAUSES: tuple[Cause, ...] = (
     ),
     linear(
         "square_root_drag", "coefficient", lambda s: 0.0, lambda s: s.torque / s.speed**0.5,
-        lambda s: tuple(f * s.torque / s.speed**0.5 for f in (0.01, 0.05, 0.2)), lambda s: 0.05 * s.torque / s.speed**0.5,
+        lambda s: tuple(f * s.torque / s.speed**0.5 for f in (0.001, 0.01, 0.05, 0.2)), lambda s: 0.05 * s.torque / s.speed**0.5,
         domains=AT_THE_SHAFT,
         curve=lambda w, p: -p["coefficient"] * np.sign(w) * np.sqrt(np.abs(w)),
         family=FRICTION,

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Collection
 from dataclasses import dataclass
 
+from gaident.diagnosis.library.terms import LIBRARY
 from gaident.diagnosis.selection.model_space import representative, words
 from gaident.diagnosis.selection.moves import Moves
 from gaident.estimation.criterion import chi_square_bound, cost_of
@@ -112,10 +113,26 @@ def rivals_of(space: Moves, final: Fit, effect: str, equivalent: Collection[str]
                 continue
         if behind < space.margin or (missed and other.impacts):
             found.append(Replacement(other.name, behind, f))
+    found += _beside_simpler(space, final, term)
     if turned is not None and turned.bic - final.bic < space.margin:
         there = Replacement(elsewhere, turned.bic - final.bic, turned)
         found.insert(0 if not found or there.behind < found[0].behind else len(found), there)
     return float(gain), found
+
+
+def _beside_simpler(space: Moves, final: Fit, term: Term) -> list[Replacement]:
+    """Effects that come as close beside a simpler friction as a generalisation of it does alone.
+
+    A small drag bends the curve of a friction over the speed as a shallow Stribeck hump does.
+    """
+    found = []
+    for simple in (LIBRARY[name] for name in term.nested if term.family and space.may(LIBRARY[name])):
+        simpler = space.known(space.as_nested(final, term, simple))
+        for f in space.extended(simpler):
+            new = [e for e in f.effects if e not in simpler.effects]
+            if len(new) == 1 and simple.name in f.effects and f.bic - final.bic < space.margin:
+                found.append(Replacement(new[0], f.bic - final.bic, f))
+    return sorted(found, key=lambda r: r.behind)
 
 
 def _only_new(fit: Fit, final: Fit) -> str:

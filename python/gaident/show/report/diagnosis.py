@@ -26,7 +26,7 @@ from gaident.show.diagnosis_summary import (
     parameter_row,
 )
 from gaident.show.gain_words import digits_apart
-from gaident.show.html import Html, Row, joined, number, table, tag, typeset
+from gaident.show.html import Html, Row, filled_table, joined, number, table, tag, typeset
 from gaident.show.relevance_words import bent_of, part_words, relevance_words, remark_words
 from gaident.show.report import charts
 from gaident.show.report.command import proposal_csv
@@ -49,6 +49,7 @@ from gaident.show.report.parts import (
 from gaident.show.report.remedies import remedies_section
 from gaident.show.report.stability import stability_section
 from gaident.show.report.views import View
+from gaident.show.units import beside
 from gaident.show.wording import (
     NOT_AS_GIVEN,
     SPREAD,
@@ -211,9 +212,11 @@ def _parameters(dia: Diagnosis, view: View, drawn: Charts) -> Section:
     for name, e in dia.mechanics.items():
         u = "" if e.unit == "1" else unit(e.unit, axis)
         old, new = dia.base_shift.get(name, (math.nan, math.nan))
-        moved = typeset(moved_words(old, new, e.std))
+        moved = typeset(moved_words(old, new, e.std)) if dia.model.effects else ""
         remark = remark_words(dia, name, e)
-        rows.append((mechanical_name(name, axis).strip(), estimate(e.value, e.std), typeset(u), number(old), moved, remark))
+        was = number(old) if dia.model.effects else ""
+        users = typeset(beside(view.scales, name, e.value, e.std, u))
+        rows.append((mechanical_name(name, axis).strip(), estimate(e.value, e.std), typeset(u), users, was, moved, remark))
     if rows:
         head = "The mechanism" + (", fitted together with the effects" if dia.model.effects else "")
         parts.append(tag("h3", head))
@@ -222,11 +225,7 @@ def _parameters(dia: Diagnosis, view: View, drawn: Charts) -> Section:
             parts.append(
                 box(tag("p", "Biased by what is left: do not trust these beyond what the figures below show."), kind="warn")
             )
-        if dia.model.effects:
-            parts.append(table(("", "value", "unit", "linear fit alone", "moved", ""), [rows]))
-        else:
-            # no decision: printed: columns of a table
-            parts.append(table(("", "value", "unit", ""), [[(*r[:3], r[5]) for r in rows]]))
+        parts.append(filled_table(("", "value", "unit", "", "linear fit alone", "moved", ""), rows))
         parts.append(tag("p", tag("small", f"± {SPREAD} The colour of the noise is taken into account.")))
     if any(not f.is_noise for f in dia.findings):
         parts.append(tag("p", "The parameters of the effects stand with their cause above."))

@@ -19,7 +19,7 @@ from gaident.show.gain_words import (
     noise_words,
     not_the_loop_words,
 )
-from gaident.show.html import Html, Row, number, table, tag, typeset
+from gaident.show.html import Html, Row, filled_table, number, table, tag, typeset
 from gaident.show.report import charts
 from gaident.show.report.parts import Charts, Section, box, needs_record
 from gaident.show.report.views import View
@@ -115,8 +115,8 @@ def _force(dia: Diagnosis, view: View) -> list[str]:
     if rows:
         parts += [tag("h3", f"{word('Torque', axis)} error"), tag("p", typeset(force_words(dia, axis)))]
         parts.append(table(rows[0], [[(row[0], *map(typeset, row[1:])) for row in rows[1:]]]))
-    both: list[Row] = [tuple(map(typeset, row)) for row in comparison_rows(dia, axis)]
+    both: list[Row] = [tuple(map(typeset, row)) for row in comparison_rows(dia, axis, view.scales)]
     if both:
         parts += [tag("h3", "Check by inverse-dynamics regression"), tag("p", typeset(method_words(dia, axis)))]
-        parts.append(table(("", "diagnosis", "regression", "unit", ""), [both]))
+        parts.append(filled_table(("", "diagnosis", "regression", "unit", "diagnosis", "regression", ""), both))
     return parts

@@ -10,11 +10,12 @@ import numpy as np
 from gaident.axis import called, said, unit, velocity_unit, word
 from gaident.results.retuning import Retuning
 from gaident.show.chart import Chart, Panel, Trace
-from gaident.show.html import Html, Row, joined, number, table, tag, typeset
+from gaident.show.html import Html, Row, filled_table, joined, number, table, tag, typeset
 from gaident.show.report.parts import Charts, Section, box, needs_record, sentences
 from gaident.show.report.retuning_words import added_filters, asked_words, figure_rows, gain_rows
 from gaident.show.report.views import Beforehand, LoopCurves, Mended, Remedies, View
 from gaident.show.response_plots import phase_line
+from gaident.show.units import beside
 
 __all__ = ["remedies_section"]
 
@@ -33,8 +34,8 @@ def remedies_section(view: View, drawn: Charts) -> Section:
         "remedies",
         "What to do",
         _doubts(do.doubts, axis),
-        _gains(do, axis, drawn),
-        _feedforward(do, axis),
+        _gains(do, view, drawn),
+        _feedforward(do, view),
         _mended(do, axis),
     )
 
@@ -53,11 +54,12 @@ def _reason(what: str, why: str, axis: str) -> Html:
     return box(tag("p", typeset(f"{what}: {text}{'' if text.endswith('.') else '.'}")), kind="quiet")
 
 
-def _gains(do: Remedies, axis: str, drawn: Charts) -> Html:
+def _gains(do: Remedies, view: View, drawn: Charts) -> Html:
+    axis = view.axis
     head, tuned = tag("h3", "Other gains for the velocity loop"), do.retuning
     if tuned is None:
         return joined((head, _reason("No gains are proposed", do.no_gains, axis)))
-    gains: list[Row] = [tuple(map(typeset, row)) for row in gain_rows(tuned, axis)]
+    gains: list[Row] = [tuple(map(typeset, row)) for row in gain_rows(tuned, axis, view.scales)]
     added = tag("p", f"Added in the path of the {word('torque', axis)}: {'; '.join(added_filters(tuned))}.")
     order = (0, 1, 3, 5, 2, 4)  # the values first: on a narrow screen a table goes on beyond its edge
     figures: list[Row] = [tuple(typeset(row[k]) for k in order) for row in figure_rows(tuned, axis)]
@@ -65,7 +67,7 @@ def _gains(do: Remedies, axis: str, drawn: Charts) -> Html:
     return joined(
         (
             head,
-            table(("", "before", "proposed", "unit"), [gains]),
+            filled_table(("", "before", "proposed", "unit", "before", "proposed"), gains),
             added if added_filters(tuned) else Html(),
             box(sentences(beyond, axis), kind="warn") if (beyond := [d for d in tuned.doubts if d not in do.doubts]) else Html(),
             tag("p", typeset(asked_words(tuned, axis))),
@@ -117,35 +119,44 @@ def _step_chart(loops: tuple[LoopCurves, ...], axis: str) -> Chart | None:
     return Chart("loop-step", "time after the step [s]", (panel,), text, limits=(0.0, end), height=300, shared=True)
 
 
-def _feedforward(do: Remedies, axis: str) -> Html:
+def _feedforward(do: Remedies, view: View) -> Html:
+    axis = view.axis
     head, found = tag("h3", "Feedforward"), do.tables
     if found is None:
         return joined((head, _reason("No feedforward is proposed", do.no_tables, axis)))
     torque = word("torque", axis)
+    known = (
+        ("in proportion to the acceleration", found.inertia, unit("kg m^2", axis)),
+        ("in proportion to the velocity", found.viscous, unit("N m s/rad", axis)),
+        ("constant", found.constant, unit("N m", axis)),
+    )
     rows: list[Row] = [
-        ("in proportion to the acceleration", number(found.inertia), typeset(unit("kg m^2", axis))),
-        ("in proportion to the velocity", number(found.viscous), typeset(unit("N m s/rad", axis))),
-        ("constant", number(found.constant), typeset(unit("N m", axis))),
+        (what, number(value), typeset(si), typeset(beside(view.scales, "", value, None, si))) for what, value, si in known
     ]
     text = f"What the drive can add to the {torque} before an error arises, positive for a motion forwards."
     command = f"gaident feedforward RESULT.json --speed {found.velocity[-1]:.4g} --csv axis.csv --c axis.c"
-    parts = [head, tag("p", text), table(("", "value", "unit"), [rows]), _friction(found, axis), _waves(found, axis)]
+    parts = [head, tag("p", text), filled_table(("", "value", "unit", ""), rows), _friction(found, view), _waves(found, axis)]
     parts += [sentences(found.notes, axis)]
     parts.append(tag("p", tag("small", "All of the tables as files: "), tag("code", command, class_="command")))
     return joined(parts)
 
 
-def _friction(found: Beforehand, axis: str) -> Html:
+def _friction(found: Beforehand, view: View) -> Html:
+    """Friction at some speeds, in the user's units where there are some."""
     if not np.any(found.friction):
         return Html()
     half = len(found.velocity) // 2
     at = half + np.unique(np.linspace(0, half - 1, SPEEDS).round().astype(int))
+    (speed, per_speed), (force, per_force) = (view.scales.get(si := unit(u, view.axis), (si, 1.0)) for u in ("rad/s", "N m"))
     rows: list[Row] = [
-        (number(float(found.velocity[k])), number(float(found.friction[k])), number(float(found.friction[2 * half - 1 - k])))
+        (
+            number(per_speed * float(found.velocity[k])),
+            number(per_force * float(found.friction[k])),
+            number(per_force * float(found.friction[2 * half - 1 - k])),
+        )
         for k in at
     ]
-    force = unit("N m", axis)
-    head = (f"speed [{velocity_unit(axis)}]", f"friction forwards, without the viscous part [{force}]", f"backwards [{force}]")
+    head = (f"speed [{speed}]", f"friction forwards, without the viscous part [{force}]", f"backwards [{force}]")
     return table(head, [rows])
 
 

@@ -6,6 +6,7 @@ from gaident.axis import said, say, unit, word
 from gaident.control.controller import Controller
 from gaident.control.filters import LowPass
 from gaident.results.retuning import Retuning
+from gaident.show.units import Scales, beside
 from gaident.show.wording import number
 
 __all__ = ["added_filters", "asked_words", "figure_rows", "gain_rows"]
@@ -27,16 +28,22 @@ FIGURES = {
 """Figure of a loop -> what it is called."""
 
 
-def gain_rows(result: Retuning, axis: str) -> list[tuple[str, str, str, str]]:
-    """(gain, before, proposed, unit) of each."""
+def gain_rows(result: Retuning, axis: str, scales: Scales) -> list[tuple[str, ...]]:
+    """(gain, before, proposed, unit, both in the user's unit) of each; the integral gain as a time, too."""
+
+    def row(name: str, old: float, new: float, si: str) -> tuple[str, ...]:
+        return name, number(old), number(new), si, *(beside(scales, "", value, None, si) for value in (old, new))
+
     before, after = result.given.gains, result.controller.gains
     rows = [
-        ("kp", number(before.kp), number(after.kp), unit("N m s/rad", axis)),
-        ("ki", number(before.ki), number(after.ki), unit("N m/rad", axis)),
+        row("kp", before.kp, after.kp, unit("N m s/rad", axis)),
+        row("ki", before.ki, after.ki, unit("N m/rad", axis)),
     ]
+    if min(before.ki, after.ki) > 0.0:
+        rows.append(row("tn = kp/ki", 1e3 * before.kp / before.ki, 1e3 * after.kp / after.ki, "ms"))
     if "position." in dict(result.given.parts):
         old, new = (float(c.to_dict()["position_gain"]) for c in (result.given, result.controller))
-        rows.append(("position gain", number(old), number(new), "1/s"))
+        rows.append(row("position gain", old, new, "1/s"))
     return rows
 
 
@@ -76,9 +83,9 @@ def _filters(controller: Controller) -> list[str]:
     return shown
 
 
-def figure_rows(result: Retuning, axis: str) -> list[tuple[str, str, str, str, str, str]]:
+def figure_rows(result: Retuning, axis: str) -> list[tuple[str, ...]]:
     """(figure, before, 95 % of the drives, after, 95 % of the drives, unit) of the loop."""
-    rows = []
+    rows: list[tuple[str, ...]] = []
     for name, words in FIGURES.items():
         if name == "stable":
             continue
