@@ -78,10 +78,10 @@ _WITH_UNIT = re.compile(r"\s*[-+\d.eE]+\s+\S")
 
 def gain(text: str) -> float | str:
     """argparse's number of a controller: with its unit, or the word for one that is not known, as text."""
-    return text if text == UNKNOWN else length(text)
+    return text if text == UNKNOWN else quantity(text)
 
 
-def length(text: str) -> float | str:
+def quantity(text: str) -> float | str:
     """argparse's number; with its unit, as text."""
     try:
         return float(text)
@@ -110,7 +110,7 @@ def add_log_options(parser: argparse.ArgumentParser) -> None:
         metavar="CH=UNIT,...",
         help="unit of each channel (rpm, deg, counts, %%, A, V, ms, ...), or the factor to SI as a number",
     )
-    g.add_argument("--dt", type=number, metavar="S", help="sample time [s], for logs without a time column")
+    g.add_argument("--dt", type=quantity, metavar="S", help="sample time [s], for logs without a time column")
     g.add_argument(
         "--velocity-cutoff",
         type=number,
@@ -124,14 +124,14 @@ def add_log_options(parser: argparse.ArgumentParser) -> None:
     )
     g.add_argument(
         "--resample",
-        type=number,
+        type=quantity,
         metavar="S",
         help="put irregular time stamps, or channels of several rates, on an even axis of this sample time [s]",
     )
     g.add_argument(
-        "--from", type=number, metavar="S", help="leave out what lies before it [s], counted from the log's first line"
+        "--from", type=quantity, metavar="S", help="leave out what lies before it [s], counted from the log's first line"
     )
-    g.add_argument("--to", type=number, metavar="S", help="leave out what lies behind it [s]")
+    g.add_argument("--to", type=quantity, metavar="S", help="leave out what lies behind it [s]")
     pieces = "take what lies around the gaps of the time as records of their own, which are identified together"
     g.add_argument("--pieces", action="store_true", default=None, help=pieces)
     g.add_argument("--gear-ratio", type=number, metavar="X", help="turns of the motor per turn of the load, with --load-side")
@@ -144,12 +144,12 @@ def add_log_options(parser: argparse.ArgumentParser) -> None:
     lines += "held, smooth: its value at the line, held until the next, or low-passed and without steps"
     g.add_argument("--torque-log", choices=TORQUE_LOGS, help=f"what a line contains of the torque: {lines}")
     for name, text in CONSTANT_HELP.items():
-        g.add_argument(f"--{name.replace('_', '-')}", type=number, metavar="X", help=text)
+        g.add_argument(f"--{name.replace('_', '-')}", type=quantity, metavar="X", help=text)
     _add_text_options(g)
     pitch = "of a linear axis, the length with which its cogging returns [m], or '10 mm': pitch of the screw or of the poles"
-    g.add_argument("--pitch", type=length, metavar="M", help=pitch)
+    g.add_argument("--pitch", type=quantity, metavar="M", help=pitch)
     screw = "of a motor on a screw, the length of a turn [m], or '10 mm': mm, mm/min and N of the log are then those of the motor"
-    g.add_argument("--screw", type=length, metavar="M", help=screw)
+    g.add_argument("--screw", type=quantity, metavar="M", help=screw)
     g.add_argument("--axis", choices=AXES, help="linear: print m, m/s, N, kg (default: rotary)")
 
 

@@ -177,7 +177,7 @@ def parser_of(commands: Mapping[str, str]) -> argparse.ArgumentParser:
     g = sub.add_argument_group("results")
     g.add_argument("-o", "--out", metavar="FILE", help="save the identification (JSON)")
     g.add_argument("--plot", metavar="FILE", help=f"draw measured against simulated ({', '.join(PICTURES)})")
-    add_report_option(g)
+    add_report_option(g, remedies=False)
     g.add_argument("--json", action="store_true", help="print what --out saves instead of the summary")
 
     sub = command(
@@ -206,7 +206,7 @@ def parser_of(commands: Mapping[str, str]) -> argparse.ArgumentParser:
     g = sub.add_argument_group("results")
     g.add_argument("-o", "--out", metavar="FILE", help="save the diagnosis (JSON)")
     g.add_argument("--plot", metavar="FILE", help=f"draw what is wrong and what is left ({', '.join(PICTURES)})")
-    add_report_option(g)
+    add_report_option(g, remedies=True)
     g.add_argument("--next-command", metavar="FILE", help="write the proposed experiment's command (CSV)")
     g.add_argument("--json", action="store_true", help="print what --out saves instead of the summary")
 

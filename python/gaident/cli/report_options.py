@@ -32,15 +32,23 @@ def add_report_options(parser: argparse.ArgumentParser) -> None:
     g = parser.add_argument_group("results")
     g.add_argument("-o", "--out", metavar="FILE", default="report.html", help="where the page goes (default: report.html)")
     _add_pictures(g)
+    _add_remedies(g)
     g.add_argument("--json", action="store_true", help="print what was written as JSON")
 
 
-def add_report_option(group: argparse._ArgumentGroup) -> None:
-    """--report of identify and diagnose."""
+def add_report_option(group: argparse._ArgumentGroup, remedies: bool) -> None:
+    """--report of identify and diagnose; remedies: whether its page proposes some."""
     group.add_argument("--report", metavar="FILE", help="write everything as one HTML page, to be sent to a colleague")
     _add_pictures(group)
+    if remedies:
+        _add_remedies(group)
 
 
 def _add_pictures(group: argparse._ArgumentGroup) -> None:
     text = "in the page, pictures in place of figures that zoom: some 0.3 MB, to be mailed or printed"
     group.add_argument("--pictures", action="store_true", help=text)
+
+
+def _add_remedies(group: argparse._ArgumentGroup) -> None:
+    text = "a page of a diagnosis without the chapter that proposes gains and feedforward, which takes some seconds"
+    group.add_argument("--no-remedies", action="store_true", help=text)

@@ -32,6 +32,7 @@ class ResultFiles:
     picture: Path | None
     page: Path | None
     live: bool = True
+    remedies: bool = True
 
     @classmethod
     def of(cls, args: Namespace, sources: Sequence[str], **others: Path | None) -> ResultFiles:
@@ -43,6 +44,7 @@ class ResultFiles:
             target_of(args.plot, sources, PICTURES),
             target_of(args.report, sources),
             not args.pictures,
+            not getattr(args, "no_remedies", False),
         )
         apart({"--out": files.result, "--plot": files.picture, "--report": files.page, **others})
         return files
@@ -70,8 +72,8 @@ class ResultFiles:
 
             save_figure(figure_in_units(figure(), scales_of(drive.units_shown, drive.axis)), self.picture)
         if self.page is not None:
-            doing(f"writing {self.page}")
-            write_report(result, self.page, records, validation, drive, self.live, stability)
+            doing(f"writing {self.page}, with gains and pictures" if self.remedies else f"writing {self.page}")
+            write_report(result, self.page, records, validation, drive, self.live, stability, self.remedies)
         return [path for path in (self.result, self.picture, self.page) if path is not None]
 
 
@@ -90,11 +92,13 @@ def write_report(
     drive: Drive,
     live: bool,
     stability: Stability | None = None,
+    remedies: bool = True,
 ) -> int:
     """The page; returns its size [bytes]."""
     from gaident.reporting.report import report_page
 
-    page = report_page(result, records, validation, drive.axis, drive.units_shown, drive.about, live, stability).encode()
+    shown = drive.axis, drive.units_shown, drive.about, live, stability, remedies
+    page = report_page(result, records, validation, *shown).encode()
     write(target, page)
     return len(page)
 

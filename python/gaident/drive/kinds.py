@@ -9,11 +9,12 @@ from gaident.checks import one_of, real_number
 from gaident.data.formats.units import factor, of_other_axis
 from gaident.data.record import CHANNELS
 from gaident.data.torque_kind import TORQUE_KINDS, TORQUE_LOGS
-from gaident.drive.quantities import number_and_unit
+from gaident.drive.quantities import number_and_unit, plain_number
 from gaident.errors import ReadError
 
 __all__ = [
-    *("Check", "axis", "channels", "column", "length", "speed", "number", "pair", "pair_or_one", "positive", "text"),
+    *("Check", "axis", "channels", "column", "length", "speed", "number", "pair", "pair_or_one", "positive"),
+    *("positive_quantity", "quantity", "text"),
     *("torque_is", "torque_log", "unit", "whole", "yes_or_no"),
 ]
 
@@ -78,6 +79,18 @@ def channels(value: object, name: str) -> tuple[str, ...]:
 
 def positive(value: object, name: str) -> float:
     found = number(value, name)
+    if not found > 0.0:
+        raise ReadError(f"{name} is {value!r}: give a number > 0")
+    return found
+
+
+def quantity(value: object, name: str) -> float:
+    """A number in SI; with its unit, "4.2 N m", too."""
+    return plain_number(value, name) if isinstance(value, str) else number(value, name)
+
+
+def positive_quantity(value: object, name: str) -> float:
+    found = quantity(value, name)
     if not found > 0.0:
         raise ReadError(f"{name} is {value!r}: give a number > 0")
     return found

@@ -16,7 +16,7 @@ from gaident.control.unknown import UNITS
 from gaident.control.words import UNKNOWN
 from gaident.errors import ControllerError, GaidentError, ReadError
 
-__all__ = ["INERTIA", "INTEGRAL_TIMES", "number_or_unit", "si_number"]
+__all__ = ["INERTIA", "INTEGRAL_TIMES", "number_and_unit", "number_or_unit", "plain_number", "si_number"]
 
 INTEGRAL_TIMES, INERTIA = ("tn", "ti"), "total_inertia"
 """Keys of the file that are no arguments of a controller: ki = kp/tn (or kp/ti), and the inertia of a gain in 1/s."""
@@ -60,6 +60,14 @@ _UNITS: dict[str, dict[str, Factor]] = {
     "acceleration_feedforward": {"kg m^2": (1.0, ""), "kg cm^2": (1e-4, ""), "kg": (1.0, "")},
     "frequency": {"Hz": (1.0, ""), "rad/s": (1.0 / math.tau, "")},
     INERTIA: {"kg m^2": (1.0, ""), "kg cm^2": (1e-4, ""), "kg": (1.0, "")},
+    # What belongs to the axis: such a unit needs no constant.
+    "rated_torque": {"N m": (1.0, ""), "mN m": (1e-3, ""), "N": (1.0, "")},
+    "torque_constant": {"N m/A": (1.0, ""), "mN m/A": (1e-3, ""), "N/A": (1.0, "")},
+    "torque_per_volt": {"N m/V": (1.0, ""), "N/V": (1.0, "")},
+    "resistance": {"Ohm": (1.0, ""), "mOhm": (1e-3, ""), "\N{GREEK CAPITAL LETTER OMEGA}": (1.0, "")},
+    "inductance": {"H": (1.0, ""), "mH": (1e-3, ""), "uH": (1e-6, "")},
+    "back_emf_constant": {"V s/rad": (1.0, ""), "V/(rad/s)": (1.0, ""), "V/rpm": (1.0 / _RPM, ""), "V s/m": (1.0, "")},
+    **dict.fromkeys(("dt", "resample", "from", "to", "duration"), _TIMES),
 }
 _OF_ONE_AXIS: dict[str, tuple[str, ...]] = {
     "rotary": ("N m", "mN m", "kg m^2", "kg cm^2", *_per(_TORQUES, _PER_SPEED), *_per(_TORQUES, _PER_ANGLE)),
@@ -76,6 +84,12 @@ def number_or_unit(value: object, name: str) -> float | str:
     if isinstance(value, str):
         return _checked(value, name, ReadError)
     return real_number(value, name, ReadError, "give one number, or a number with its unit in quotes")
+
+
+def plain_number(value: str, name: str) -> float:
+    """The number in SI of text with a unit that needs no constant of the axis. Raises ReadError."""
+    number, unit = number_and_unit(_checked(value, name, ReadError))
+    return number * _units(name)[_spelling(unit)][0]
 
 
 def si_number(value: Any, name: str, constants: Mapping[str, Any]) -> float | None:

@@ -13,6 +13,7 @@ A position controller samples every k-th sample of the velocity controller: the 
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -37,6 +38,7 @@ WIDEST = np.radians(88.0)  # no decision: a grid: of the phase of a resonance, a
 EVEN = 80  # no decision: a grid: frequencies evenly apart, of an integral up to half the sampling frequency
 BAND = np.sqrt(0.5)  # no decision: a formula: -3 dB, the edge of a bandwidth
 SETTLED = 0.05  # no decision: a formula: the band about its end in which a step has settled, 5 % by definition
+LONG_ENOUGH = 64  # no decision: of a solver: samples of a step after which the torque may have passed its largest value
 FALLEN = 16.0  # no decision: a formula: time constants of the slowest pole, by which nothing is left of a step
 
 
@@ -154,6 +156,23 @@ class Loops:
         torque = states[:, :, n : n + m] @ Ac.C + Ac.D[0] + Ac.D[1] * velocity
         return velocity, torque, self.plants.period
 
+    def step_torque(self) -> float:
+        """The largest torque of all drives [N m] in a unit step of the velocity command.
+
+        The step goes on until the torque has stayed below half of the largest for as long as the step took up to there.
+        """
+        A, B = self.velocity_loop
+        Ac = controller_states(self.cascade, self.plants.period)
+        n, m = self.plants.F.shape[-1], len(Ac.A)
+        largest = abs(float(Ac.D[0]))  # at the first sample
+        for states in _doubled(A[:, :-1, :-1], B[:, :-1, 0]):
+            velocity = np.einsum("sn,skn->sk", self.plants.H, states[:, :, :n])
+            torque = float(np.max(np.abs(states[:, :, n : n + m] @ Ac.C + Ac.D[0] + Ac.D[1] * velocity)))
+            if torque < 0.5 * largest and states.shape[1] >= LONG_ENOUGH:
+                break
+            largest = max(largest, torque)
+        return largest
+
     def placed(self, every: int) -> Placed:
         """The position loop, which samples every so many samples."""
         A, B = self.velocity_loop
@@ -208,15 +227,20 @@ def _stepped(A: Matrix, B: Vector) -> Matrix:
 
     Twice as many samples at once:  x(m + i) = A^m x(i) + x(m).
     """
+    return np.concatenate([np.zeros((len(A), 1, A.shape[-1])), *_doubled(A, B)], axis=1)
+
+
+def _doubled(A: Matrix, B: Vector) -> Iterator[Matrix]:
+    """The same states from the second on, each time as many more as there were."""
     slowest = float(np.max(np.abs(np.linalg.eigvals(A))))
     wanted = FALLEN / -np.log(min(max(slowest, 1e-9), 1.0 - 1e-9))
     states, power, end = np.zeros((len(A), 1, A.shape[-1])), A, B[:, None, :]
     while states.shape[1] < min(wanted, POLICY.step_samples):
         more = states @ power.transpose(0, 2, 1) + end
+        yield more
         states = np.concatenate([states, more], axis=1)
         end = end @ power.transpose(0, 2, 1) + end
         power = power @ power
-    return states
 
 
 def settling(y: Vector, dt: float) -> Vector:

@@ -109,7 +109,7 @@ class Search:
                 excess += max(0.0, math.log(max(noise / asked.torque_noise, 1e-300)))
             if asked.torque_limit is not None:
                 few = Loops(self.plants.chosen(STEPPED), cascade, self.responses)
-                torque = asked.step * float(np.max(np.abs(few.step()[1])))
+                torque = asked.step * few.step_torque()
                 excess += max(0.0, math.log(max(torque / asked.torque_limit, 1e-300)))
             gains = cascade.velocity
             worth = math.log(max(float(loops.stiffness[0]), 1e-300)) if gains.ki > 0.0 else math.log(gains.kp)

@@ -48,6 +48,7 @@ def report(
     about: Mapping[str, str] | None = None,
     live: bool = True,
     stability: Stability | None = None,
+    remedies: bool = True,
 ) -> None:
     """Write a result as one HTML page that needs nothing else: no network, no other file, no Python.
 
@@ -82,6 +83,8 @@ def report(
     stability : Stability, optional
         Of one diagnosis: what `Diagnosis.stability` gave; None: what is kept with it, `Diagnosis.varied`.
         The page then says how often each cause is named again.
+    remedies : bool
+        Of one diagnosis: whether the page says what to do, with other gains and feedforward, which takes some seconds.
 
     Raises
     ------
@@ -106,7 +109,7 @@ def report(
     True
     """
     check_writable(path)
-    write_whole(path, report_page(result, records, validation, axis, units, about, live, stability).encode())
+    write_whole(path, report_page(result, records, validation, axis, units, about, live, stability, remedies).encode())
 
 
 def report_page(
@@ -118,12 +121,14 @@ def report_page(
     about: Mapping[str, str] | None = None,
     live: bool = True,
     stability: Stability | None = None,
+    remedies: bool = True,
 ) -> str:
     """The text of what `report` writes."""
     check_installed(NEEDED, "pictures", "a report")
     if about is not None and not isinstance(about, Mapping):
         raise GaidentError(f"about is {about!r:.80}: give a dictionary of texts, for example {{'machine': 'press 4'}}")
     yes_or_no(live, "live", GaidentError)
+    yes_or_no(remedies, "remedies", GaidentError)
     if stability is None and isinstance(result, Diagnosis):
         stability = result.varied
     if stability is not None:
@@ -148,7 +153,8 @@ def report_page(
         view = view_of(result, records, validation, axis)
         if isinstance(result, Diagnosis):
             made_of = _fitted(result, _records(records, result.records, "records"))
-            view = replace(view, remedies=remedies_of(result, made_of), stability=stability)
+            to_do = remedies_of(result, made_of) if remedies else None
+            view = replace(view, remedies=to_do, to_do=remedies, stability=stability)
         return page(result, whole(view), plotly_js)
     named = _named(result)
     given = {rec.digest: rec for rec in (*_records(records, (), "records"), *_records(validation, (), "validation"))}

@@ -135,6 +135,18 @@ def test_simulate_takes_the_saved_controller_and_start(here: Path, capsys: pytes
     np.testing.assert_allclose(data["runs"][0]["torque"], torque)
 
 
+def test_simulate_takes_the_controller_that_was_found_where_the_file_does_not_know_its_gains(
+    here: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["identify", "step.csv", *NAMES, *LOOP, "--out", "idn.json"]) == 0
+    assert main(["simulate", "idn.json", "step.csv", *NAMES, *LOOP, "--out", "known.csv"]) == 0
+    capsys.readouterr()
+    unknown = ["--kp", "unknown", "--ki", "unknown"]
+    assert main(["simulate", "idn.json", "step.csv", *NAMES, *unknown, "--out", "found.csv"]) == 0
+    assert "the controller that was found with the model closes the loop" in capsys.readouterr().err
+    assert Path("found.csv").read_bytes() == Path("known.csv").read_bytes()
+
+
 def test_simulate_several_logs_into_a_folder(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
     Path("m.json").write_text('{"gain": 5000, "poles": [-10]}')
     Path("other.csv").write_bytes(Path("step.csv").read_bytes())

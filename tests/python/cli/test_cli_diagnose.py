@@ -68,10 +68,14 @@ def test_variations_of_the_log_are_printed_and_stand_in_the_page(
     assert "coulomb_friction: named in 1 of 2 variations that could show it: a hint" in out
     page = Path("page.html").read_text(encoding="utf-8")
     assert "Is it beyond doubt?" in page and page.index("first half") < page.index("second half")
+    assert main(["diagnose", "run0.csv", *LOOP, "--stability", "--out", "dia.json", "--quiet"]) == 0
+    assert main(["report", "dia.json", "--out", "again.html", "--pictures"]) == 0
+    assert "Is it beyond doubt?" in Path("again.html").read_text(encoding="utf-8")
+    asked.clear()
     assert main(["diagnose", "run0.csv", *LOOP, "--stability", "--json"]) == 0
     assert [v["what"] for v in json.loads(capsys.readouterr().out)["stability"]["variations"]] == ["first half", "second half"]
     assert main(["diagnose", "run0.csv", *LOOP, "--json"]) == 0
-    assert "stability" not in json.loads(capsys.readouterr().out) and len(asked) == 2
+    assert "stability" not in json.loads(capsys.readouterr().out) and len(asked) == 1
 
 
 @pytest.mark.long
@@ -91,9 +95,10 @@ def test_what_was_found_outside_of_an_expected_range_is_said(here: Path, capsys:
     told = "The inertia was found as"
     for inertia, said in (("[1e-5, 2e-5]", True), ("[1e-5, 1.0]", False)):
         Path("drive.toml").write_text(f"[space]\ninertia = {inertia}\nresonance_hz = [200, 220]\n")
+        beside = "expected 1e-05 to 2e-05" if said else "expected 1e-05 to 1"
         assert main(["diagnose", "run0.csv", "--validation", "run1.csv", *LOOP, "--drive", "drive.toml"]) == 0
         out = " ".join(capsys.readouterr().out.split())
-        assert (told in out) == said and "resonance was found" not in out
+        assert (told in out) == said and "resonance was found" not in out and beside in out
 
 
 def test_json_is_what_out_saves_and_a_model_is_taken(here: Path, capsys: pytest.CaptureFixture[str]) -> None:

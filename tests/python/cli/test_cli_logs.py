@@ -251,7 +251,7 @@ def test_the_unit_of_a_velocity_by_its_position() -> None:
         ('load_side = ["angle"]', "load_side is 'angle'", "position"),
         ("decimate = 2.5", "decimate is 2.5", "whole number"),
         ("[limits]\nsped = 3", "[limits] has the key 'sped'", "did you mean 'speed'?"),
-        ('[limits]\nspeed = "fast"', "[limits] speed is 'fast'", "without quotes"),
+        ('[limits]\nspeed = "fast"', "[limits] speed is 'fast'", 'or with its unit, "3000 rpm"'),
         ("resampel = 1e-3", "has the key 'resampel'", "did you mean 'resample'?"),
     ],
 )

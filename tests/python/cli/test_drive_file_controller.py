@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +15,8 @@ from cli_cases import refusal
 from gaident.cli import COMMANDS, main
 from gaident.cli.drive import drive_of
 from gaident.cli.options import parser_of
+from gaident.drive.drive_file import read_drive_file
+from gaident.errors import ReadError
 
 NAMES = '[columns]\ntime = "t"\ncommand = "r"\nvelocity = "w"\ntorque = "u"\n'
 SINAMICS = ga.PI(0.02, 2.0)
@@ -197,3 +200,25 @@ def test_a_position_controller_needs_its_command(here: Path, capsys: pytest.Capt
     Path("drive.toml").write_text(f"{NAMES}[controller]\nkp = 0.02\nki = 2\nposition_gain = 40\n")
     said = refusal(["identify", "log.csv", "--drive", "drive.toml"], capsys)
     assert "there is no position_command" in said and "--columns position_command=..." in said
+
+
+def test_numbers_of_the_axis_may_have_their_unit(here: Path) -> None:
+    text = 'rated_torque = "4,2 N m"\ntorque_constant = "56 mN m/A"\ndt = "250 us"\ninductance = "2.1 mH"\nfrom = "1.5 s"\n'
+    text += 'back_emf_constant = "0.0105 V/rpm"\nresistance = "0.8 Ohm"\n[limits]\nspeed = "3000 rpm"\nduration = "800 ms"\n'
+    Path("drive.toml").write_text(text)
+    found = read_drive_file("drive.toml")
+    top = {"rated_torque": 4.2, "torque_constant": 0.056, "dt": 250e-6, "inductance": 2.1e-3, "from": 1.5, "resistance": 0.8}
+    assert {key: found[""][key] for key in top} == pytest.approx(top)
+    assert found[""]["back_emf_constant"] == pytest.approx(0.0105 * 60.0 / (2.0 * np.pi))
+    assert found["limits"] == pytest.approx({"speed": 100.0 * np.pi, "duration": 0.8})
+    call = ["identify", "log.csv", "--rated-torque", "4.2 N m", "--dt", "1 ms"]
+    drive = drive_of(parser_of(dict.fromkeys(COMMANDS, print)).parse_args(call))
+    assert (drive.general["rated_torque"], drive.general["dt"]) == (4.2, 1e-3)
+    for wrong, said in (
+        ('rated_torque = "4.2 V"', "'V' is none of its units; give one of N m"),
+        ('torque_constant = "much"', "torque_constant is 'much': give one number, a number with its unit"),
+        ('resample = "-1 ms"', "resample is '-1 ms': give a number > 0"),
+    ):
+        Path("drive.toml").write_text(wrong)
+        with pytest.raises(ReadError, match=re.escape(said)):
+            read_drive_file("drive.toml")

@@ -109,6 +109,7 @@ def test_the_step_is_that_of_the_simulation(drive: str, name: str) -> None:
     if not (loops := loops_of(model, cascade)).stable[0]:
         pytest.skip("not stable")
     velocity, torque, _ = loops.step()
+    assert loops.step_torque() == pytest.approx(np.abs(torque).max(), rel=1e-12)
     n = min(300, velocity.shape[1])
     run = ga.run(
         model,

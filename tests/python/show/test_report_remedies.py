@@ -120,3 +120,20 @@ def test_a_cause_that_hides_or_cannot_be_taken_out_is_a_row_all_the_same() -> No
     assert "A cause with 0 % does not show in it" in text and "without coulomb friction" in text
     seen = str(_table_of(Mended("run", "rad/s", 0.1, None, {("load_torque", ""): 0.05}), "rotary"))
     assert "does not show in it" not in seen
+
+
+def test_the_chapter_can_be_left_out(dia: ga.Diagnosis, no_gains: None) -> None:
+    page = report_page(dia, remedies=False)
+    assert "What to do" not in page and "What could not be tested" in page
+    with pytest.raises(ga.GaidentError, match="remedies"):
+        report_page(dia, remedies="no")  # type: ignore[arg-type]
+
+
+def test_gains_and_feedforward_stand_in_the_units_of_the_drive_too(dia: ga.Diagnosis, fast: None) -> None:
+    found = remedies(dia)
+    assert found.retuning is not None and found.tables is not None
+    text = Reader(report_page(dia, units={"velocity": "rpm", "torque": "mN m"})).text
+    to_do = text[text.rindex("What to do") : text.rindex("What could not be tested")]
+    per_rpm = 1e3 * 2.0 * np.pi / 60.0
+    assert f"{found.retuning.given.gains.kp * per_rpm:.4g} mN m/rpm" in to_do
+    assert f"{found.tables.viscous * per_rpm:.4g} mN m/rpm" in to_do and "speed [rpm]" in to_do

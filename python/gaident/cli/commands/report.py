@@ -36,7 +36,7 @@ def report_command(args: argparse.Namespace) -> None:
         stems = [Path(path).stem for path in results]
         shown = {stem if stems.count(stem) == 1 else path: results[path] for stem, path in zip(stems, results, strict=True)}
         records = [rec for rec in records if rec.digest in known or len(drives) == 1]
-    size = write_report(shown, target, records, validation, drives[0], not args.pictures)
+    size = write_report(shown, target, records, validation, drives[0], not args.pictures, remedies=not args.no_remedies)
     if args.json:
         print_json({"schema": "gaident/report", "schema_version": 1, "path": str(target), "bytes": size})
         return

@@ -31,8 +31,12 @@ __all__ = ["simulate_command"]
 def simulate_command(args: argparse.Namespace) -> None:
     drive = drive_of(args)
     model, controller, states = _load_model(args.model)
-    if drive.controller_values and drive.controller() != controller:
-        controller, states = drive.controller(), {}  # the saved states are of the loop they were found in
+    given = drive.controller() if drive.controller_values else controller
+    if given is not None and given.unknown and controller is not None:
+        said = "the controller that was found with the model closes the loop: the given one has numbers that are not known"
+        print(said, file=sys.stderr)
+    elif given != controller:
+        controller, states = given, {}  # the saved states are of the loop they were found in
     records = read_all(drive, args.logs, controller, measured=False)
     if len(records) != len(args.logs):
         raise SettingsError("--pieces: gaident simulate takes a log as one record; name a part of it with --from and --to")

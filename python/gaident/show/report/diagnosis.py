@@ -152,7 +152,7 @@ def chapters(dia: Diagnosis, view: View, drawn: Charts) -> list[Section]:
         *stability_section(view),
         _parameters(dia, view, drawn),
         gain_section(dia, view, drawn),
-        remedies_section(view, drawn),
+        *([remedies_section(view, drawn)] if view.to_do else []),
         _untested(dia, view),
         _next(dia, view, drawn),
         _how(dia, view),

@@ -139,7 +139,7 @@ class View:
     runs: one per record, those that were fitted first. curve: (velocity, torque, label) of named effects. response: of the
     longest record, see `gaident.results.frequency.Responses`; without it no_response says why. made_with: what computed
     and drew the page -> version. axis: "rotary" or "linear". scales: to the user's units. about: what stands below the title.
-    remedies: what to do with a diagnosis; None where that is not worked out.
+    remedies: what to do with a diagnosis; None where that is not worked out. to_do: whether the page has that chapter.
     stability: what variations of its records say, likewise.
     """
 
@@ -152,6 +152,7 @@ class View:
     scales: Scales = field(default_factory=dict)
     about: Mapping[str, str] = field(default_factory=dict)
     remedies: Remedies | None = None
+    to_do: bool = True
     stability: Stability | None = None
 
     @property
