@@ -44,6 +44,7 @@ provide(
         "stability": "gaident.diagnosis.stability:stability",
         "stability_summary": "gaident.show.wording:stability_summary",
         "run_as_seen": "gaident.estimation.mean_velocity:run_as_seen",
+        "timed_record": "gaident.identification.replay.command_timing:timed_record",
         # InverseDynamics
         "regression_torque": "gaident.estimation.regression.prediction:regression_torque",
         "regression_error": "gaident.estimation.regression.prediction:regression_error",

@@ -37,6 +37,7 @@ from gaident.errors import SettingsError
 from gaident.identification.identify import identify
 from gaident.identification.replay.command_timing import timed
 from gaident.identification.replay.driven_records import Driven, torque_driven
+from gaident.identification.replay.notes import jump_notes
 from gaident.models.drive_torque import on_lines
 from gaident.policy.table import POLICY
 from gaident.results.diagnosis import Diagnosis
@@ -46,8 +47,8 @@ from gaident.results.identification import Identification
 __all__ = ["Diagnosis", "Finding", "diagnose"]
 
 IDENTIFIED_AGAIN = say(
-    "The given identification is one under the given gains, which these records contradict: another one, under the gains that "
-    "were found, is in its place."
+    "The given identification is not of the controller that explains these records: another one, under that controller, is in "
+    "its place."
 )
 FIRST_CAUSE = Text(
     "This was the quick search, which stops at the first cause: whether there is another one was not looked for, and another one "
@@ -274,7 +275,8 @@ def diagnose(
         if identification is not None and work.idn is not identification:
             result = replace(result, notes=(IDENTIFIED_AGAIN, *result.notes))
         answered = work.at_controller.decided or any(f.place == "controller" for f in result.findings)
-        result = replace(result, notes=(*driving.notes, *discarded, *(() if answered else driving.doubts), *result.notes))
+        times = jump_notes(prepared[0].given)
+        result = replace(result, notes=(*driving.notes, *times, *discarded, *(() if answered else driving.doubts), *result.notes))
         if bootstrap:
             from gaident.diagnosis.selection.bootstrap import with_p_value
 

@@ -36,7 +36,8 @@ class Log:
 
     position: at the controller's samples (n, r). between: the command at the controller's samples (n, r) where it is known
     there, see `Controller.source_of`; else `source`. moving: it starts in motion, and what the integrator stored before is not
-    known. mean: of means since the line before.
+    known. mean: of means since the line before. late: controller samples by which the torque of a line is older than its motion,
+    as that is which was measured before the new one acts.
     """
 
     dt: float
@@ -48,6 +49,7 @@ class Log:
     between: Vector
     moving: bool = False
     mean: bool = False
+    late: int = 0
 
     @property
     def command(self) -> Vector:
@@ -64,10 +66,16 @@ class Log:
         velocity = straight_between(self.velocity[::every], every) if straight else self.velocity
         ticks = cascade.ticks(self.dt, self.between, self.position)
         loop = cascade.core_loop(self.dt)
-        torque = at_lines(core.servo_torque(self.dt, ticks, velocity, loop), every, self.mean)
+        torque = at_lines(self._written(core.servo_torque(self.dt, ticks, velocity, loop)), every, self.mean)
         if self.moving or not (stored := stored_beside(self.torque, torque, cascade)):
             return torque
-        return at_lines(core.servo_torque(self.dt, ticks, velocity, loop, stored), every, self.mean, stored)
+        return at_lines(
+            self._written(core.servo_torque(self.dt, ticks, velocity, loop, stored), stored), every, self.mean, stored
+        )
+
+    def _written(self, torque: Vector, before: float = 0.0) -> Vector:
+        """The torque at the controller's samples [N m] (n r,) as the log has it there; before: the record."""
+        return np.concatenate([np.full(self.late, before), torque[: len(torque) - self.late]]) if self.late else torque
 
     def asked(self, cascade: Cascade) -> tuple[Vector, Matrix]:
         """At the controller's samples: what a position controller asks for [rad/s] (n r,), slope and sign of v* (2, n r)."""

@@ -18,6 +18,7 @@ from gaident.control.controller import Controller
 from gaident.data.record import Record
 from gaident.errors import GaidentError
 from gaident.estimation.mean_velocity import run_as_seen
+from gaident.identification.replay.command_timing import timed_record
 from gaident.models.model import Model
 from gaident.remedies.doubts import doubts_of
 from gaident.remedies.feedforward import feedforward
@@ -66,7 +67,7 @@ def remedies_of(result: Diagnosis, records: Sequence[Record]) -> Remedies | None
 
 def _mended(dia: Diagnosis, rec: Record, tuned: Retuning | None) -> Mended:
     """Raises GaidentError with the reason where there is no such table."""
-    controller = dia.controller
+    controller, rec = dia.controller, timed_record(rec, dia.controller)
     if controller is None:
         raise GaidentError(NO_LOOP)
     if not dia.loop_follows:

@@ -171,7 +171,7 @@ class WhatIf(SavedResult):
     def as_used(self, rec: Record) -> Record:
         """Return a record as the diagnosis used it.
 
-        That is without the shifts of its log, see `log_shifts`.
+        That is without the shifts of its log, see `log_shifts`, and with the times at which its command jumped between its lines.
         Without a bare PI its torque is then the one that drove the motor over each line, see docs/controllers.md.
 
         Parameters
@@ -189,7 +189,7 @@ class WhatIf(SavedResult):
         RecordError
             Where no torque is logged and this controller makes none of what is.
         """
-        rec = as_read(given_record(rec), self.controller, self.log_shifts)
+        rec = provided("timed_record")(as_read(given_record(rec), self.controller, self.log_shifts), self.controller)
         return rec if self.controller is None or self.controller.one_equation else driven_by(rec, self.controller)
 
     def simulate_without(self, effect: str, rec: Record | None = None, *, side: str | None = None) -> Run:

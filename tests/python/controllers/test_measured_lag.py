@@ -132,22 +132,22 @@ def slow_record(lag: float, noise: float, seed: int = 5, cascade: ga.Cascade = C
 
 @pytest.mark.parametrize("seed", [1, 2])
 def test_a_measured_torque_of_a_slow_log_lags_by_a_low_pass(seed: int) -> None:
-    form = behind_a_lag([slow_record(0.8e-3, 0.005, seed)], [], CASCADE)
-    assert form is not None and [f.effect for f in form.findings] == ["torque_filter"]
-    found = form.findings[0].parameters["time_constant"]
+    form = behind_a_lag([slow_record(0.8e-3, 0.005, seed)], CASCADE)
+    assert form is not None and form.finding.effect == "torque_filter"
+    found = form.finding.parameters["time_constant"]
     assert abs(found.value - 0.8e-3) < 3.0 * found.std < 0.3 * found.value
-    assert form.notes[0].startswith("The measured torque lags behind what the controller asks for, by a low pass of 0.")
+    assert form.note.startswith("The measured torque lags behind what the controller asks for, by a low pass of 0.")
 
 
 @pytest.mark.parametrize("seed", [1, 2])
 def test_a_noise_of_the_measured_torque_is_no_lag_and_a_commanded_one_has_none(seed: int) -> None:
-    assert behind_a_lag([slow_record(0.0, 0.005, seed)], [], CASCADE) is None
-    assert behind_a_lag([slow_record(0.8e-3, 0.005, seed).with_channels(torque_is="commanded")], [], CASCADE) is None
+    assert behind_a_lag([slow_record(0.0, 0.005, seed)], CASCADE) is None
+    assert behind_a_lag([slow_record(0.8e-3, 0.005, seed).with_channels(torque_is="commanded")], CASCADE) is None
 
 
 def test_what_was_given_beside_the_lag_stays() -> None:
     given = replace(CASCADE, velocity=replace(CASCADE.velocity, torque_limit=50.0, anti_windup="hold"))
-    form = behind_a_lag([slow_record(0.8e-3, 0.005)], [], given)
+    form = behind_a_lag([slow_record(0.8e-3, 0.005)], given)
     assert form is not None and form.controller.velocity == given.velocity
     assert [type(f) for f in form.controller.torque_filters] == [ga.LowPass]
 
@@ -157,7 +157,7 @@ def test_a_torque_that_a_slow_log_writes_late_has_no_lag(lines: int) -> None:
     rec = slow_record(0.0, 0.005)
     assert rec.torque is not None
     late = rec.with_channels(torque=np.concatenate([np.zeros(lines), rec.torque[:-lines]]))
-    assert behind_a_lag([late], [], CASCADE) is None
+    assert behind_a_lag([late], CASCADE) is None
 
 
 @pytest.mark.long

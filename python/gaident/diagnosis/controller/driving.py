@@ -28,7 +28,7 @@ from gaident.diagnosis.unlogged.unlogged_form import UnloggedForm
 from gaident.identification.logged_torque import comparable, corrected, not_followed
 from gaident.identification.replay.driven_records import Driven
 from gaident.identification.replay.replay import replay
-from gaident.models.drive_torque import driven_by, straight_driven
+from gaident.models.drive_torque import driven_by, on_lines, straight_driven
 from gaident.results.estimate import Estimate
 from gaident.results.finding import Finding
 
@@ -195,10 +195,11 @@ def driving_of(
                 moved = aligned(records, validation, None, True)
     if form is None and pi is None and driven.slower and not limited and not asked.findings:
         assert controller is not None
-        later = [origin.get(r.digest, r) for r in validation]
-        form = behind_a_lag([origin.get(r.digest, r) for r in records], later, controller)
-        if form is not None:
-            form = replace(form, findings=(*findings, *form.findings), estimates={**numbers, **form.estimates})
+        measured = [origin.get(r.digest, r) for r in records]
+        if (behind := behind_a_lag(measured, controller)) is not None:
+            alone = _without_controller(measured, [origin.get(r.digest, r) for r in validation], asked)
+            said = (*(n for n in notes if n not in driven.notes), behind.note, *alone.notes)
+            return replace(alone, findings=(*findings, behind.finding), notes=said, numbers=numbers)
     if form is not None:
         controller, pi, notes, doubts = form.controller, None, (*notes, *form.notes), ()
         findings, numbers, found = form.findings, form.estimates, form.found
@@ -218,6 +219,13 @@ def driving_of(
         notes = (*asked.period_notes, *notes)
     simulated = form is None or form.simulated
     return Driving(moved, used, logged, findings, notes, doubts, numbers, limited, lag=lag, found=found, simulated=simulated)
+
+
+def _without_controller(records: Sequence[Record], validation: Sequence[Record], asked: Loop) -> Driving:
+    """Records whose logged torque drives the model by itself."""
+    here, there = (tuple(on_lines(r, None) for r in part) for part in (records, validation))
+    origin = {now.digest: r for now, r in zip((*here, *there), (*records, *validation), strict=True)}
+    return driving_of(here, there, Loop(None, asked.numbers), Driven(here, None), origin)
 
 
 def _again(

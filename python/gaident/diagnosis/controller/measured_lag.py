@@ -23,6 +23,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,21 +33,19 @@ from gaident.control.cascade import Cascade, cascade_of
 from gaident.control.controller import Controller
 from gaident.control.filtering import filtered
 from gaident.control.filters import LowPass
-from gaident.control.found import FoundNumbers
 from gaident.control.pi import PI
 from gaident.control.pi_torque import pi_torque
 from gaident.data.record import Record
 from gaident.data.torque_kind import COMMANDED, MEASURED, SAMPLE
-from gaident.diagnosis.controller.form_findings import Driver
 from gaident.diagnosis.controller.slow_forms import follow, run_error, time_std
 from gaident.estimation.criterion import bic, gained
 from gaident.identification.logged_torque import comparable
 from gaident.identification.replay.causes import white_noise
 from gaident.identification.replay.replay import replay
-from gaident.models.drive_torque import driven_by
 from gaident.policy.table import POLICY
 from gaident.results.estimate import Estimate
 from gaident.results.finding import Finding
+from gaident.show.wording import with_std
 
 __all__ = ["Lag", "behind_a_lag", "commanded", "lag_shown"]
 
@@ -235,7 +234,15 @@ def _without(parts: Sequence[_Part], controller: PI) -> float:
     return best
 
 
-def behind_a_lag(records: Sequence[Record], validation: Sequence[Record], given: Controller) -> Driver | None:
+class Behind(NamedTuple):
+    """A low pass behind which a measured torque follows from its controller, which has it here; the finding and a note on it."""
+
+    controller: Cascade
+    finding: Finding
+    note: Text
+
+
+def behind_a_lag(records: Sequence[Record], given: Controller) -> Behind | None:
     """The given controller with a low pass in the path of its torque, where measured torques of a slower log show one; else None.
 
     A motor's current lags behind what its controller asks for, by the current loop or by a filter.
@@ -250,41 +257,41 @@ def behind_a_lag(records: Sequence[Record], validation: Sequence[Record], given:
     def lagging(time: float) -> Cascade:
         return replace(cascade, torque_filters=(LowPass(time),))
 
-    def left(logarithm: float) -> float:
-        return run_error(records, lagging(float(np.exp(logarithm))))
+    def fitted(older: int) -> tuple[float, float, int]:
+        """(what is left [N m], time constant [s], older) of a torque older by so many controller samples; inf at an end."""
 
-    dt = records[0].dt
-    grid = np.log(dt * np.geomspace(POLICY.fastest_lag, POLICY.slowest_lag, LAG_TIMES))
-    k = int(np.argmin([left(x) for x in grid]))
-    if not 0 < k < LAG_TIMES - 1:
-        return None
-    best = minimize_scalar(left, bounds=(grid[k - 1], grid[k + 1]), method="bounded", options={"xatol": LAG_EXACT})
-    time, behind, without = float(np.exp(best.x)), float(best.fun), run_error(records, cascade)
+        def left(logarithm: float) -> float:
+            return run_error(records, lagging(float(np.exp(logarithm))), older)
+
+        k = int(np.argmin([left(x) for x in grid]))
+        if not 0 < k < LAG_TIMES - 1:
+            return np.inf, 0.0, older
+        best = minimize_scalar(left, bounds=(grid[k - 1], grid[k + 1]), method="bounded", options={"xatol": LAG_EXACT})
+        return float(best.fun), float(np.exp(best.x)), older
+
+    grid = np.log(records[0].dt * np.geomspace(POLICY.fastest_lag, POLICY.slowest_lag, LAG_TIMES))
+    behind, time, older = min(map(fitted, SAMPLES_LATE))
+    without = run_error(records, cascade)
     if not behind < POLICY.each_number * without or not follow(records, lagging(time)):
         return None
     late = min(_late_by_lines(records, cascade, lines) for lines in range(1, POLICY.log_late + 1))
     if not behind < POLICY.better_reason * late:
         return None
-    std = time_std(records, lagging, time)
+    sample = records[0].dt / cascade.log_every(records[0].dt)
+    # Within a sample of the controller it is not known when the current is measured, and when the next command acts.
+    std = float(np.hypot(time_std(records, lagging, time, older), sample / np.sqrt(12.0)))
     if not time > POLICY.check_deviations * std:
         return None
     text = (
-        "The measured {torque} lags behind what the controller asks for, by a low pass of {:.3g} ms: with it that follows to "
-        "{:.2g} {N m} rms, without it to {:.2g} {N m}. That is the current loop, or a filter of it that was not given."
+        "The measured {torque} lags behind what the controller asks for, by a low pass of {} ms: with it that follows to "
+        "{:.2g} {N m} rms, without it to {:.2g} {N m}. That is the current loop, or a filter of it that was not given. What acts "
+        "on the shaft is the measured {torque}: it drives the model, and no loop is simulated."
     )
     ms = 1e3  # no decision: a unit: in a second
-    note, n = say(text, ms * time, behind, without), sum(map(len, records))
+    note, n = say(text, with_std(ms * time, ms * std), behind, without), sum(map(len, records))
     lag = {"time_constant": Estimate(time, std, "s")}
     finding = Finding("torque_filter", lag, (), 0.0, gained(n * without**2, n * behind**2, n, 1), None, note, place="controller")
-    found = FoundNumbers(
-        made=lambda at: lagging(float(at[0])),
-        at=np.array([time]),
-        covariance=np.array([[std**2]]),
-        low=POLICY.negligible * time,
-        named=lambda at, spread: {"torque_filter": {"time_constant": (float(at[0]), float(np.sqrt(spread[0, 0])))}},
-    )
-    driven, later = (tuple(driven_by(r, lagging(time)) for r in part) for part in (records, validation))
-    return Driver(driven, later, lagging(time), (finding,), (note,), {}, found)
+    return Behind(lagging(time), finding, note)
 
 
 def _late_by_lines(records: Sequence[Record], cascade: Cascade, lines: int) -> float:

@@ -50,17 +50,18 @@ class Limited:
     time_std: float = 0.0
 
 
-def run_error(records: Sequence[Record], controller: Cascade) -> float:
+def run_error(records: Sequence[Record], controller: Cascade, late: int = 0) -> float:
     """Root mean square of logged minus made torque [N m] over whole records, the controller at its own clock.
 
     Of records that start in motion what the integrator stored is not known: the controller runs without limits, and what is left
     is taken without its mean in each stretch between two limits; on the lines at a limit it is 0 where the controller has one.
+    late: controller samples by which the logged torque is older than the motion of its line.
     """
-    whole = [log_of(r, len(r), controller, True) for r in records]
+    whole = [replace(log_of(r, len(r), controller, True), late=late) for r in records]
     if not any(log.moving for log in whole):
         return float(np.sqrt(np.mean(np.concatenate([log.torque - log.made(controller) for log in whole]) ** 2)))
     free = replace(controller, velocity=unlimited(controller.velocity))
-    cut = [log_of(r, len(r), controller, False) for r in records]
+    cut = [replace(log_of(r, len(r), controller, False), late=late) for r in records]
     off, stretch = np.concatenate([log.torque - log.made(free) for log in cut]), numbered([log.stretch for log in cut])
     between = centred(*whitened(off, stretch, 0.0), False)
     at_limit = off[(stretch < 0) & np.concatenate([log.stretch >= 0 for log in whole])]
@@ -129,7 +130,7 @@ def _time_std(records: Sequence[Record], best: Cascade) -> float:
     return 0.0 if time is None else time_std(records, tracked, time)
 
 
-def time_std(records: Sequence[Record], with_time: Callable[[float], Cascade], time: float) -> float:
+def time_std(records: Sequence[Record], with_time: Callable[[float], Cascade], time: float, late: int = 0) -> float:
     """Deviation of a time of a controller [s], by what is left and how the torque changes with it.
 
     With what a velocity that goes straight between the lines would move it by.
@@ -138,14 +139,14 @@ def time_std(records: Sequence[Record], with_time: Callable[[float], Cascade], t
 
     def made(at: float, straight: bool = False) -> Vector:
         one = with_time(at)
-        return np.concatenate([log_of(r, len(r), one, True).made(one, straight) for r in records])
+        return np.concatenate([replace(log_of(r, len(r), one, True), late=late).made(one, straight) for r in records])
 
     slope = (made(time * NEXT_TIME) - made(time / NEXT_TIME)) / (time * NEXT_TIME - time / NEXT_TIME)
     power = float(slope @ slope)
     if not power > 0.0:
         return float("inf")
     moved = float(slope @ (made(time, straight=True) - made(time))) / power
-    return max(float(np.hypot(run_error(records, best) / np.sqrt(power), moved)), SUM_ROUNDING * time)
+    return max(float(np.hypot(run_error(records, best, late) / np.sqrt(power), moved)), SUM_ROUNDING * time)
 
 
 def _closest(records: Sequence[Record], controller: Cascade, limit: float) -> Cascade:

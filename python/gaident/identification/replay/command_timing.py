@@ -48,7 +48,7 @@ from gaident.policy.table import POLICY
 if TYPE_CHECKING:
     from scipy.sparse import csc_array
 
-__all__ = ["timed"]
+__all__ = ["timed", "timed_record"]
 
 Vector = NDArray[np.float64]
 
@@ -70,6 +70,11 @@ def timed(records: Sequence[Record], controller: Controller | None) -> tuple[Rec
     if controller is None or controller.unknown or controller.driven_by != "command":
         return plain
     return tuple(_timed(rec, controller) for rec in plain)
+
+
+def timed_record(rec: Record, controller: Controller | None) -> Record:
+    """One record as `timed` has it."""
+    return timed([rec], controller)[0]
 
 
 def _timed(rec: Record, controller: Controller) -> Record:

@@ -4,14 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+import numpy as np
+
 from gaident.axis import Text, joined, say, unit_text
+from gaident.control.between import jumps_between
 from gaident.control.controller import Controller
 from gaident.control.pi import bare_pi
 from gaident.data.record import Record
 from gaident.identification.replay.replay import Replay, replay
+from gaident.identification.replay.timed_record import TimedRecord
 from gaident.policy.table import POLICY
 
-__all__ = ["replay_notes"]
+__all__ = ["jump_notes", "replay_notes"]
 
 UNITS = {"kp": "N m s/rad", "ki": "N m/rad", "torque_limit": "N m"}
 
@@ -40,3 +44,23 @@ def _instead(said: Replay, loop: Controller) -> Text:
     shown = [(name, getattr(found, name), getattr(given, name)) for name in UNITS]
     parts = [say("{} = {:.6g} {}", name, value, unit_text(UNITS[name])) for name, value, old in shown if value not in (None, old)]
     return say(" Give {}.", joined(", ", parts)) if parts else Text("")
+
+
+def jump_notes(records: Sequence[Record]) -> list[Text]:
+    """How many jumps of the velocity command came between the lines of the log, as its torque tells; none where none did."""
+    early = count = 0
+    for rec in records:
+        command, between = rec.command, rec.command_between if isinstance(rec, TimedRecord) else None
+        if command is None or between is None:
+            continue
+        jumps = jumps_between(command)
+        rise = command[jumps + 1] - command[jumps]
+        count += len(jumps)
+        early += int(np.sum(np.abs(between[jumps, -1] - command[jumps]) > 0.5 * np.abs(rise)))  # no decision: a formula: rounding
+    if not early:
+        return []
+    text = (
+        "Of {} jumps of the velocity command {} came before the line that shows them, as the logged {torque} tells; the "
+        "simulation has them there."
+    )
+    return [say(text, count, early)]
