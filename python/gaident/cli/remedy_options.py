@@ -53,6 +53,7 @@ def add_retune_options(parser: argparse.ArgumentParser) -> None:
     g.add_argument("--torque-noise", type=number, metavar="X", help="largest rms of the torque that noise makes [N m]")
     g.add_argument("--step", type=number, metavar="X", help="size of that step [rad/s] (default 1)")
     g.add_argument("--dt", type=number, metavar="S", help="sample time of the controller [s]")
+    g.add_argument("--most-times", type=number, metavar="X", help="times the given gains, which the proposed ones are at most")
     g.add_argument("--no-filters", action="store_true", help="add no low pass and no notch to a cascade")
     g.add_argument("--seed", type=int, default=0, metavar="N", help="same seed, same result (default 0)")
     g = parser.add_argument_group("results")

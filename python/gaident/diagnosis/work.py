@@ -102,8 +102,7 @@ class Work:
         self.hit = hit = [np.union1d(h, more) for h, more in zip(of_log, others, strict=True)]
         self.clean = clean = tuple(cleaned(r, h) for r, h in zip(self.records, others, strict=True))
         self.step = quantisation(self.records)
-        whole = self.driving.read
-        read = as_read(whole, [cleaned(r, h) for r, h in zip(whole, others, strict=True)], self.controller)
+        read = as_read(whole := self.driving.read, list(map(cleaned, whole, others)), self.controller)
         data = DataSet.of(clean, self.controller, any(len(h) for h in others), read, self.step, self.axis, self.pitch)
         data = replace(data.with_its_period(), clocked=self.driving.clocked)
         self.notes += period_seen(data)
@@ -235,8 +234,7 @@ class Work:
         """The effects that stand, and their gains. Where none stands, those of the search by whitened errors are judged."""
         while True:
             said = list(self.notes)
-            gains = self._accepted_gains()
-            driver = self.left.driver if self.adequate else self.left.strongest
+            gains, driver = self._accepted_gains(), self.left.driver if self.adequate else self.left.strongest
             adds_up = self.data.slower and not self.data.fits_in_loop  # what the torque lacks between the lines of the log
             beyond = gains.after.rmse / floor if (floor := gains.floor) > 0.0 else 0.0
             if driver is None and not adds_up and beyond > POLICY.free_run_ratio:
@@ -254,8 +252,9 @@ class Work:
             mechanics = mechanics_of(self.under, self.estimate)
             model = self._made(self.estimate.x)
             check = by_second_method(self.data, gains, model, mechanics, estimates)
+            unnamed = len(causes) < len(self.final.effects)  # an effect describes what has no name
             causes, why = standing(causes, gains, check, self._equivalent_here)
-            if why or check.loses:
+            if why or check.loses or unnamed:
                 driver = driver or self.left.strongest or "time"
                 self.notes += why
             self.notes += basis_of(self.found, driver is not None)
@@ -291,7 +290,8 @@ class Work:
             alternatives = self._alternatives(effect, rivals, offset, never)
             self.notes += [or_other_gains(effect)] * (effect in self.gain_doubt.rivals)
             ends = ends_of(self.found.space, self.final, effect, [r.effect for r in rivals])
-            said_by, sides = evidence_of(effect, gain, alternatives, offset, ends), ends.sides
+            known = estimates[effect], self.data.velocity
+            said_by, sides = evidence_of(effect, gain, alternatives, offset, ends, known), ends.sides
             what = name_of(effect), estimates[effect], alternatives, gains.of(effect), gain, None, said_by, False
             findings.append(Finding(*what, LIBRARY[effect].place, sides))
         if (impossible := of_no_axis(mechanics)) is not None:
@@ -303,8 +303,8 @@ class Work:
         if driver is not None and (dropped := [e for e in self.final.effects if e not in causes]):
             shown = driver if self.left.gains[driver] > self.left.needed else None
             self.notes.append(closest(dropped, shown, bool(real)))
-        ages = of_the_age(self.under, self.estimate)
-        self.notes += (*of_the_mechanics(mechanics, ages, self.data, self.driving.left_open), *check.notes)
+        ages, left_open = of_the_age(self.under, self.estimate), self.driving.left_open
+        self.notes += (*of_the_mechanics(mechanics, ages, self.data, left_open), *check.notes)
         self.notes += [ON_A_SPRING] * (self.final.parameters.on_a_spring and any(LIBRARY[e].constant for e in self.final.effects))
         ambiguous = [f for f in real if f.alternatives]
         proposal = None
@@ -312,8 +312,8 @@ class Work:
             self.note(0.95, "proposing the next experiment")
             from gaident.diagnosis.experiments.next_experiment import propose
 
-            elsewhere = self.at_controller.effects
-            proposal, notes = propose(ambiguous, self.rivals, self.final, self.data, self.objective.count, elsewhere)
+            other = self.objective.count, self.at_controller.effects
+            proposal, notes = propose(ambiguous, self.rivals, self.final, self.data, *other)
             self.notes += notes
         extended = bool(self.final.effects or self.at_controller.effects or self.data.slower)
         return Diagnosis(

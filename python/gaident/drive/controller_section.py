@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -34,7 +35,16 @@ def _filters(value: object, name: str) -> tuple[Mapping[str, Any], ...]:
 
 
 def _filter(data: Mapping[str, Any]) -> LowPass | Notch:
-    return filter_of({key: value if key == "kind" else si_number(value, key, {}) for key, value in data.items()})
+    """A filter; a low pass by its time constant or by the frequency at which it is 3 dB down, 1/(2 pi time_constant)."""
+    numbers = {key: value if key == "kind" else si_number(value, key, {}) for key, value in data.items()}
+    if numbers.get("kind") == "low pass" and "frequency" in numbers:
+        if "time_constant" in numbers:
+            raise ControllerError("the low pass has time_constant and frequency: give the one or the other")
+        frequency = numbers.pop("frequency")
+        if frequency is not None and not frequency > 0.0:
+            raise ControllerError(f"frequency is {data['frequency']!r}: give one > 0")
+        numbers["time_constant"] = None if frequency is None else 1.0 / (math.tau * frequency)
+    return filter_of(numbers)
 
 
 PI_KEYS: dict[str, Check] = {

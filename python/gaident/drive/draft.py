@@ -29,7 +29,7 @@ _CONSTANTS = {
     "torque_per_volt": ("0.24", say("{N m/V}")),
     "counts_per_turn": ("4096", Text("encoder counts per turn of the motor")),
 }
-SPACE = "where to look, if you know; what is not given is derived from the data"
+SPACE = "what you expect: said beside what is found; identify looks only there"
 NONE: Mapping[str, str | int] = {}
 LIMITS = "what an experiment may do, for `gaident experiment`"
 SHOW = "units of the summary and the page, beside SI"
@@ -333,7 +333,8 @@ class _Draft:
                 "controller.ki",
                 f'{unit("N m/rad", self.axis)}; integral gain, or in its place tn = "17 ms", its time',
             ),
-            line_of('# period = "125 us"', "of a controller that is faster than the log; also delay, torque_filters, ..."),
+            line_of('# period = "125 us"', "of a controller that is faster than the log; also delay, ..."),
+            line_of('# torque_filters = [{ kind = "low pass", frequency = "250 Hz" }]', "also velocity_filters, command_filters"),
             line_of('# rule = "backward"', 'of the integral, or "forward"; left out: "trapezoidal"'),
             line_of("# torque_limit = 2.4", "a known limit of the controller, and integrator_limit"),
             *(self._position_controller() if positioned else []),
@@ -353,6 +354,7 @@ class _Draft:
     def _space(self) -> list[str]:
         return [
             line_of("# inertia = [1e-4, 5e-3]", said(Text("total inertia at the motor, kg m^2", "total mass, kg"), self.axis)),
+            line_of("# damping = [1e-3, 3e-3]", said(say("viscous friction, {N m s/rad}"), self.axis)),
             line_of("# resonance_hz = [5, 200]", "where the mechanism may resonate"),
         ]
 

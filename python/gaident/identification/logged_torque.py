@@ -26,6 +26,7 @@ from numpy.typing import NDArray
 from gaident.axis import Text, joined, say, unit_text
 from gaident.control.cascade import FEEDFORWARDS, Cascade, cascade_of
 from gaident.control.controller import Controller
+from gaident.control.filters import LowPass
 from gaident.control.found import FoundNumbers
 from gaident.control.pi import RULES
 from gaident.control.position import P
@@ -33,7 +34,7 @@ from gaident.control.ticks import smooth_between
 from gaident.data.record import Record
 from gaident.data.signals.lattice import rounding_step
 from gaident.errors import GaidentError
-from gaident.identification.controller_numbers import with_estimates
+from gaident.identification.controller_numbers import Numbers, with_estimates
 from gaident.identification.logged_stretches import Log, centred, correlation, log_of, whitened
 from gaident.identification.number_words import read_as
 from gaident.identification.replay.driven_records import follows_not, torque_driven
@@ -187,16 +188,17 @@ def corrected(records: Sequence[Record], controller: Controller) -> Corrected | 
     if (rule := _other_rule(records, cascade_of(controller))) is not None:
         return rule
     found = []
-    for given, one in _with_one_open(cascade_of(controller)):
-        try:
-            numbers = with_estimates(records, one)
-        except GaidentError:  # the records lack what shows it
+    of = cascade_of(controller)
+    for given, one in _with_one_open(of):
+        numbers = _following(records, one)
+        if numbers is None or numbers.controller is None:
             continue
-        if numbers.controller is None or numbers.doubt or _doubts(records, numbers.controller):
-            continue
-        of = cascade_of(controller)
         if all(abs(e.value - _given(of, n)) <= POLICY.check_deviations * e.std for n, e in numbers.estimates.items()):
             continue  # none of them is another number than the given one
+        if any(name in FEEDFORWARDS and e.value < 0.0 for name, e in numbers.estimates.items()):
+            late = _late(records, of)  # no drive brakes where its command asks for acceleration
+            found += [] if late is None else [late]
+            continue
         values = [_value(name, e) for name, e in numbers.estimates.items()]
         moved = read_as(numbers.controller, controller)
         also = say(", and {},", moved) if moved else ""
@@ -205,6 +207,34 @@ def corrected(records: Sequence[Record], controller: Controller) -> Corrected | 
             Corrected(numbers.controller, numbers.estimates, say(text, joined(" and ", values), given, also), numbers.found)
         )
     return found[0] if len(found) == 1 else None
+
+
+def _following(records: Sequence[Record], one: Cascade) -> Numbers | None:
+    """Its unknown numbers, with which all torques follow; None where they do not, or the records lack what shows them."""
+    try:
+        numbers = with_estimates(records, one)
+    except GaidentError:
+        return None
+    refused = numbers.controller is None or numbers.doubt or _doubts(records, numbers.controller)
+    return None if refused else numbers
+
+
+def _late(records: Sequence[Record], cascade: Cascade) -> Corrected | None:
+    """The cascade with a command that acts late, as behind a low pass: to first order in its frequency that is a delay.
+
+    Under kp a delay tau of the command looks like an acceleration feedforward of -kp tau.
+    """
+    if cascade.driven_by != "command":
+        return None
+    numbers = _following(records, replace(cascade, command_filters=(*cascade.command_filters, LowPass(None))))
+    if numbers is None or numbers.controller is None:
+        return None
+    ((_, time),) = numbers.estimates.items()
+    text = (
+        "With a command that acts {:.3g} ms late, as behind a low pass with this time constant, it does: all simulations use "
+        "this. That is a filter of the command, or the way to the drive."
+    )
+    return Corrected(numbers.controller, numbers.estimates, say(text, 1e3 * time.value), numbers.found)
 
 
 def _other_rule(records: Sequence[Record], cascade: Cascade) -> Corrected | None:

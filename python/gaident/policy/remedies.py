@@ -22,6 +22,9 @@ class RetunedGains:
     most_sensitivity: float = remedy(
         2.0, "1", "largest sensitivity of a proposed loop (Astrom and Hagglund: 1.4 to 2), or what the margins asked for imply"
     )
+    raised: float = remedy(
+        3.0, "1", "times the given gains, that a page proposes at most: one step, behind which the drive is recorded again"
+    )
     filter_pays: float = remedy(1.1, "1", "times the stiffness of the loop without it, from which on a filter is proposed")
     position_overshoot: float = remedy(4.0, "%", "of a step of the position loop at most, without feedforward")
     swings_on: float = remedy(

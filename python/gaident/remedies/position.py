@@ -25,7 +25,7 @@ def position_gain(search: Search, cascade: Cascade, asked: Asked) -> float | Non
     for gain in 2.0 * np.pi * float(np.min(loops.bandwidths)) * GAINS:
         L = gain * response
         margins = np.min(phase_margins(L)) >= asked.phase_margin and np.min(gain_margins(L)) >= asked.gain_margin
-        if not (margins and placed.stable(gain).all()):
+        if gain > asked.most[2] or not (margins and placed.stable(gain).all()):
             break
         kept.append(float(gain))
     own = Placed(placed.A[:1], placed.B[:1], placed.period)

@@ -5,13 +5,12 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 
 from gaident.arguments import arg
 from gaident.axis import Text, say
-from gaident.checks import above_zero, size_of_drive, time_of_sample, yes_or_no
+from gaident.checks import time_of_sample, yes_or_no
 from gaident.control.cascade import Cascade, cascade_of
 from gaident.control.controller import Controller, checked_controller
 from gaident.control.differencing import older
@@ -29,7 +28,7 @@ from gaident.remedies.nonlinear import simulated_with, without_each
 from gaident.remedies.plants import sampled_plants
 from gaident.remedies.position import position_gain
 from gaident.remedies.rules import resonances, rule_gains
-from gaident.remedies.search import UNSTABLE, Asked, Search, Tuned
+from gaident.remedies.search import UNSTABLE, Search, Tuned, asked_of, at_most, most_of
 from gaident.results.diagnosis import Diagnosis
 from gaident.results.identification import Identification
 from gaident.results.retuning import Retuning, RuleStart
@@ -44,8 +43,6 @@ MOST_FILTERS = 8  # no decision: what an argument may be: filters of a cascade i
 HIGHEST_NOTCH = 0.45  # no decision: a start; of the sampling frequency
 NOTCH = (0.1, 0.6)  # no decision: a start; dampings of a notch
 FASTEST = 0.5  # no decision: a start; time constant of a low pass in samples
-UPPER = 90.0  # no decision: what an argument may be; deg
-DECIBELS = 40.0  # no decision: what an argument may be
 
 
 def retune(
@@ -60,6 +57,7 @@ def retune(
     dt: float | None = None,
     filters: bool = True,
     seed: int = 0,
+    most_times: float | None = None,
 ) -> Retuning:
     """Propose gains for the drive of a result: as stiff as the margins, the torque and the uncertainty of the model allow.
 
@@ -94,6 +92,8 @@ def retune(
         Whether a Cascade may get a low pass and a notch.
     seed : int
         Seed of the drives that are drawn; the same seed gives the same result.
+    most_times : float, optional
+        Times the given kp, ki and gain of the position controller, which the proposed ones are at most, 1 or more; None: any.
 
     Returns
     -------
@@ -123,7 +123,8 @@ def retune(
     """
     given = _controller_of(result, controller)
     period = _period_of(result, given, dt)
-    asked = _asked(result, given, phase_margin, gain_margin, torque_limit, torque_noise, step)
+    wanted = asked_of(result, given, phase_margin, gain_margin, torque_limit, torque_noise, step)
+    asked = replace(wanted, most=most_of(given, most_times))
     yes_or_no(filters, "filters", SettingsError)
     if isinstance(seed, bool) or not isinstance(seed, int) or seed < 0:
         raise SettingsError(f"seed is {seed!r}: give a whole number >= 0")
@@ -174,7 +175,13 @@ def retune(
         starts=work.starts(),
         simulated=told,
         mended=without_each(drawn[0], then, period, asked.step, after),
-        notes=(*notes, *more, *_of_the_covariance(len(drawn) - 1, holds), *_of_the_mechanism(result.model)),
+        notes=(
+            *notes,
+            *more,
+            *at_most(proposal, asked, most_times),
+            *_of_the_covariance(len(drawn) - 1, holds),
+            *_of_the_mechanism(result.model),
+        ),
         model=drawn[0],
         period=period,
         velocity_age=age,
@@ -343,42 +350,3 @@ def _period_of(result: Identification | Diagnosis, given: Controller, dt: float 
     if result.records:
         return result.records[0].dt
     raise SettingsError(f"the sample time of the controller is not known: a loaded result has no records; give {arg('dt')} [s]")
-
-
-def _asked(
-    result: Identification | Diagnosis,
-    given: Controller,
-    phase: float,
-    gain: float,
-    torque: float | None,
-    torque_noise: float | None,
-    step: float | None,
-) -> Asked:
-    own = None if np.isinf(given.limits[0]) else given.limits[0]
-    numbers: dict[str, Any] = {}
-    for name, value, highest, unit in (("phase_margin", phase, UPPER, "deg"), ("gain_margin", gain, DECIBELS, "dB")):
-        numbers[name] = above_zero(value, name, SettingsError, f"give a number in {unit}, > 0")
-        if not 0.0 < numbers[name] < highest:
-            raise SettingsError(f"{name} is {numbers[name]:g}: give a number in {unit}, above 0 and below {highest:g}")
-    for name, more in (("torque_limit", torque), ("torque_noise", torque_noise), ("step", step)):
-        if more is not None:
-            numbers[name] = size_of_drive(more, name, SettingsError, "give a number > 0, or leave it out")
-    return Asked(
-        numbers["phase_margin"],
-        numbers["gain_margin"],
-        numbers.get("torque_limit", own),
-        numbers["step"] if "step" in numbers else _step_of(result),
-        numbers.get("torque_noise"),
-        _noise_of(result),
-    )
-
-
-def _step_of(result: Identification | Diagnosis) -> float:
-    jumps = [float(np.max(np.abs(np.diff(r.command, prepend=r.velocity[0])))) for r in result.records if r.command is not None]
-    return max(jumps, default=0.0) or 1.0
-
-
-def _noise_of(result: Identification | Diagnosis) -> float:
-    if isinstance(result, Diagnosis):
-        return result.after.noise_floor if result.noise is None else result.noise
-    return result.adequacy.noise_std

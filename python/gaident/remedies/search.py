@@ -13,18 +13,25 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import minimize
 
-from gaident.control.cascade import Cascade
+from gaident.axis import Text, say
+from gaident.checks import above_zero, real_number, size_of_drive
+from gaident.control.cascade import Cascade, cascade_of
+from gaident.control.controller import Controller
 from gaident.control.filters import Filter, LowPass, Notch
+from gaident.errors import SettingsError
 from gaident.policy.table import POLICY
 from gaident.remedies.loops import Loops, frequencies_of
 from gaident.remedies.plants import PlantResponses, Plants
+from gaident.results.diagnosis import Diagnosis
+from gaident.results.identification import Identification
 
-__all__ = ["UNSTABLE", "Asked", "Search", "Tuned"]
+__all__ = ["UNSTABLE", "Asked", "Search", "Tuned", "asked_of", "at_most", "most_of"]
 
 Vector = NDArray[np.float64]
 
@@ -33,6 +40,9 @@ UNSTABLE = 1e3  # no decision: of a solver: the cost of a loop that is not stabl
 SIDE = 0.25  # no decision: of a solver: the sides of the first simplex, ln of a gain
 STEPPED = slice(0, 4)  # no decision: of a solver: drives whose largest torque the search looks at
 SMALLER = 0.97  # no decision: of a solver: a step towards gains that keep what was asked for
+UPPER = 90.0  # no decision: what an argument may be; deg
+DECIBELS = 40.0  # no decision: what an argument may be
+TOP = 0.88  # no decision: printed: of a gain as large as allowed; gains of a position controller are tried 12 % apart
 AGAIN = 2  # no decision: of a solver: simplexes, each from the end of the one before, which edges stop
 TOLERANCE = 1e-3  # no decision: of a solver: ends the search; a thousandth of a gain
 
@@ -47,6 +57,14 @@ class Asked:
     step: float
     torque_noise: float | None
     noise: float
+    most: tuple[float, float, float] = (math.inf, math.inf, math.inf)  # kp, ki and the gain of a position controller
+
+    def capped(self, cascade: Cascade) -> Cascade:
+        """The controller with gains no larger than allowed."""
+        own, (kp, ki, _) = cascade.velocity, self.most
+        if own.kp <= kp and own.ki <= ki:
+            return cascade
+        return replace(cascade, velocity=replace(own, kp=min(own.kp, kp), ki=min(own.ki, ki)))
 
     @property
     def sensitivity(self) -> float:
@@ -95,7 +113,8 @@ class Search:
         return self.plants.responses(frequencies_of(self.plants, POLICY.tuned_points, POLICY.tuned_near))
 
     def judged(self, cascade: Cascade, rule: str) -> Tuned:
-        """One controller."""
+        """One controller, its gains no larger than allowed."""
+        cascade = self.asked.capped(cascade)
         loops, asked = Loops(self.plants, cascade, self.responses), self.asked
         with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
             if not loops.stable.all():
@@ -189,3 +208,69 @@ def _notch(start: Notch, values: Vector) -> Notch:
     width = start.denominator_damping * math.exp(math.tanh(values[1]))
     depth = start.numerator_damping / start.denominator_damping * math.exp(math.tanh(values[2])) ** 2
     return Notch(frequency, min(depth, 1.0) * width, width)
+
+
+def asked_of(
+    result: Identification | Diagnosis,
+    given: Controller,
+    phase: float,
+    gain: float,
+    torque: float | None,
+    torque_noise: float | None,
+    step: float | None,
+) -> Asked:
+    """What a proposal has to keep. Raises SettingsError for numbers out of their range."""
+    own = None if np.isinf(given.limits[0]) else given.limits[0]
+    numbers: dict[str, Any] = {}
+    for name, value, highest, unit in (("phase_margin", phase, UPPER, "deg"), ("gain_margin", gain, DECIBELS, "dB")):
+        numbers[name] = above_zero(value, name, SettingsError, f"give a number in {unit}, > 0")
+        if not 0.0 < numbers[name] < highest:
+            raise SettingsError(f"{name} is {numbers[name]:g}: give a number in {unit}, above 0 and below {highest:g}")
+    for name, more in (("torque_limit", torque), ("torque_noise", torque_noise), ("step", step)):
+        if more is not None:
+            numbers[name] = size_of_drive(more, name, SettingsError, "give a number > 0, or leave it out")
+    return Asked(
+        numbers["phase_margin"],
+        numbers["gain_margin"],
+        numbers.get("torque_limit", own),
+        numbers["step"] if "step" in numbers else _step_of(result),
+        numbers.get("torque_noise"),
+        _noise_of(result),
+    )
+
+
+def _step_of(result: Identification | Diagnosis) -> float:
+    jumps = [float(np.max(np.abs(np.diff(r.command, prepend=r.velocity[0])))) for r in result.records if r.command is not None]
+    return max(jumps, default=0.0) or 1.0
+
+
+def _noise_of(result: Identification | Diagnosis) -> float:
+    if isinstance(result, Diagnosis):
+        return result.after.noise_floor if result.noise is None else result.noise
+    return result.adequacy.noise_std
+
+
+def most_of(given: Controller, times: float | None) -> tuple[float, float, float]:
+    """kp, ki and gain of the position controller at most."""
+    if times is None:
+        return math.inf, math.inf, math.inf
+    if not (factor := real_number(times, "most_times", SettingsError, "give a number >= 1, or None")) >= 1.0:
+        raise SettingsError(f"most_times is {times!r}: give a number >= 1, or None")
+    own = cascade_of(given)
+    gains = own.velocity.kp, own.velocity.ki, 0.0 if own.position is None else own.position.gain
+    return tuple(factor * gain if gain > 0.0 else math.inf for gain in gains)  # type: ignore[return-value]
+
+
+def at_most(proposal: Cascade, asked: Asked, times: float | None) -> list[Text]:
+    """What is said where a gain is as large as allowed."""
+    kp, ki, place = asked.most
+    position = 0.0 if proposal.position is None else proposal.position.gain
+    if times is None or not any(
+        gain >= TOP * most for gain, most in ((proposal.velocity.kp, kp), (proposal.velocity.ki, ki), (position, place))
+    ):
+        return []
+    text = (
+        "No gain is raised to more than {:g} times the given one, although the margins would allow it: record the drive with "
+        "these gains, and go on from there."
+    )
+    return [say(text, times)]

@@ -20,6 +20,7 @@ from gaident.errors import GaidentError
 from gaident.estimation.mean_velocity import run_as_seen
 from gaident.identification.replay.command_timing import timed_record
 from gaident.models.model import Model
+from gaident.policy.table import POLICY
 from gaident.remedies.doubts import doubts_of
 from gaident.remedies.feedforward import feedforward
 from gaident.remedies.nonlinear import mendable
@@ -51,7 +52,7 @@ def remedies_of(result: Diagnosis, records: Sequence[Record]) -> Remedies | None
             raise GaidentError(NOT_ON_THIS)
         if dia.controller is None:
             raise GaidentError(NO_CONTROLLER)
-        tuned = retune(dia, filters=isinstance(dia.controller, Cascade))
+        tuned = retune(dia, filters=isinstance(dia.controller, Cascade), most_times=POLICY.raised)
         found = replace(found, retuning=tuned, loops=loop_curves(tuned))
     except GaidentError as error:
         found = replace(found, no_gains=message_of(error))

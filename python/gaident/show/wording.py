@@ -147,7 +147,9 @@ def size_words(finding: Finding, axis: str) -> str:
     if name in _ANGULAR and e.unit == "rad/s":
         return f"{number(e.value / math.tau, 3)} Hz"
     value, u = (1e3 * e.value, "ms") if e.unit == "s" else (e.value, unit(e.unit, axis))
-    return f"{number(value, 3)} {u}"
+    still = finding.parameters.get("static_torque")  # what the axis breaks away with
+    at_rest = f", {number(still.value, 3)} {u} at standstill" if still is not None and math.isfinite(still.value) else ""
+    return f"{number(value, 3)} {u}{at_rest}"
 
 
 def not_as_given(finding: Finding, axis: str) -> str:
@@ -159,15 +161,15 @@ def not_as_given(finding: Finding, axis: str) -> str:
 def missing_words(finding: Finding, dia: Diagnosis, axis: str) -> str:
     """One of several explanations; where all are kinds of one thing, that with its size: friction, 0.119 N m; its kind is open.
 
-    Kinds of one thing share the last word of their names. The end of the shaft is that of the first.
+    Kinds of one thing have the last word of the first one's name in theirs. The end of the shaft is that of the first.
     """
     names = [words(name, axis).split() for name in (finding.effect, *finding.alternatives)]
-    size = size_words(finding, axis)
-    if not size or len({name[-1] for name in names}) > 1 or min(map(len, names)) == 1:
+    thing, size = names[0][-1], size_words(finding, axis)
+    if not size or not all(thing in name for name in names) or min(map(len, names)) == 1:
         return ""
-    kinds = [" ".join(name[:-1]) for name in names]
+    kinds = [" ".join(word for word in name if word != thing) for name in names]
     first = f"{kinds[0]} {where(finding, dia.model)}".rstrip()
-    return f"{names[0][-1]}, {size}; its kind is open ({', '.join((first, *kinds[1:-1]))} or {kinds[-1]})"
+    return f"{thing}, {size}; its kind is open ({', '.join((first, *kinds[1:-1]))} or {kinds[-1]})"
 
 
 def stability_summary(found: Stability) -> str:

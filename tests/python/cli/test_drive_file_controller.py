@@ -79,6 +79,10 @@ CASES: dict[str, tuple[str, ga.PI | ga.Cascade]] = {
             torque_filters=(ga.LowPass(4e-4),),
         ),
     ),
+    "a low pass by its frequency": (
+        '[controller]\nkp = 0.02\nki = 2\ntorque_filters = [{ kind = "low pass", frequency = "250 Hz" }]\n',
+        ga.Cascade(SINAMICS, torque_filters=(ga.LowPass(1.0 / (2.0 * np.pi * 250.0)),)),
+    ),
     "a bandwidth and an inertia": (
         '[controller]\nkp = "200 1/s"\ntotal_inertia = "1 kg cm^2"\ntn = 0.01\n',
         ga.PI(0.02, 2.0),

@@ -240,3 +240,18 @@ def test_wrong_use_is_told(found: ga.Diagnosis, named: dict[str, Any], message: 
         ga.retune(found, **named)
     with pytest.raises(ga.GaidentError, match="result is str"):
         ga.retune("found")  # type: ignore[arg-type]
+
+
+def test_gains_are_raised_no_further_than_asked(found: ga.Diagnosis, tuned: ga.Retuning) -> None:
+    given = tuned.given.gains
+    free = max(tuned.controller.gains.kp / given.kp, tuned.controller.gains.ki / given.ki)
+    assert free > 1.5, "the margins would allow more"
+    times = 1.0 + 0.4 * (free - 1.0)
+    held = ga.retune(found, phase_margin=50.0, most_times=times)
+    own = held.controller.gains
+    assert own.kp <= times * given.kp * (1.0 + 1e-12) and own.ki <= times * given.ki * (1.0 + 1e-12)
+    assert held.keeps and any(f"more than {times:g} times the given one" in note for note in held.notes)
+    assert not any("times the given one" in note for note in tuned.notes)
+    for wrong in (0.5, float("nan"), "3"):
+        with pytest.raises(ga.GaidentError, match="most_times"):
+            ga.retune(found, most_times=wrong)  # type: ignore[arg-type]

@@ -34,6 +34,7 @@ def retune_command(args: argparse.Namespace) -> None:
         dt=args.dt,
         filters=not args.no_filters,
         seed=args.seed,
+        most_times=args.most_times,
     )
     axis = args.axis or tuned.axis
     if out is not None:

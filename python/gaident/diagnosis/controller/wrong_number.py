@@ -45,6 +45,11 @@ PLACES: Mapping[str, tuple[str, str]] = {
 """Name of a number (`Controller.unknown`) -> (finding, parameter)."""
 
 
+def _place(name: str) -> tuple[str, str]:
+    """(finding, parameter) of a number by its name; of a filter of the command, whichever of them it is."""
+    return ("command_filter", "time_constant") if name.startswith("command_filters[") else PLACES[name]
+
+
 def closer_form(records: Sequence[Record], form: Driver | None, other: Corrected | None) -> Driver | None:
     """The form that the torques show of a given controller, where it leaves clearly less of them than another number does."""
     if form is None or other is None:
@@ -129,7 +134,7 @@ def wrong_numbers(records: Sequence[Record], given: Controller, other: Corrected
     rule = cascade_of(given).velocity.rule != cascade_of(other.controller).velocity.rule
     by_finding: dict[str, dict[str, Estimate]] = {"integration_rule": {}} if rule else {}
     for name, estimate in other.estimates.items():
-        finding, parameter = PLACES[name]
+        finding, parameter = _place(name)
         by_finding.setdefault(finding, {})[parameter] = estimate
     return tuple(
         Finding(name, numbers, (), 0.0, gained(before, after, n, len(numbers)), None, other.note, place="controller")
@@ -147,7 +152,7 @@ def with_findings(other: Corrected) -> Corrected:
     def also(at: Vector, spread: Matrix) -> dict[str, Mapping[str, tuple[float, float]]]:
         all_named: dict[str, Mapping[str, tuple[float, float]]] = dict(named(at, spread))
         for name, pair in all_named.get("", {}).items():
-            finding, parameter = PLACES[name]
+            finding, parameter = _place(name)
             all_named[finding] = {**all_named.get(finding, {}), parameter: pair}
         return all_named
 

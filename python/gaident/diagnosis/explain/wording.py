@@ -5,11 +5,13 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
 from gaident.axis import Text, called, joined, say
 from gaident.control.found import FoundNumbers
 from gaident.diagnosis.explain.ends import NO_ENDS, Ends
 from gaident.diagnosis.library.sides import called_of
+from gaident.diagnosis.library.terms import LIBRARY
 from gaident.diagnosis.selection.offset import Offset
 from gaident.diagnosis.selection.select import Selection
 from gaident.estimation.dataset import DataSet
@@ -41,9 +43,17 @@ ON_A_SPRING = Text("The axis is on a spring to the ground: its tension where the
 
 
 def evidence_of(
-    effect: str, gain: float, alternatives: Sequence[str], offset: Offset | None = None, ends: Ends = NO_ENDS
+    effect: str,
+    gain: float,
+    alternatives: Sequence[str],
+    offset: Offset | None = None,
+    ends: Ends = NO_ENDS,
+    known: tuple[Mapping[str, Estimate], NDArray[np.float64]] | None = None,
 ) -> Text:
-    """What speaks for a finding: what it does, where, how sure that is, what these data cannot tell from it."""
+    """What speaks for a finding: what it does, where, how sure that is, what these data cannot tell from it.
+
+    known: its parameters and the velocity of the records [rad/s], of which a drag's torque is said.
+    """
     from gaident.show.wording import certainty
 
     what = row_of(effect).says.begun()
@@ -56,7 +66,17 @@ def evidence_of(
         return say("{}, or {}: one of these is there, {} {}; these data do not say which.", what, others, sure, worse)
     if offset is not None and effect == offset.effect:
         return say("{}: {} {}. {}", what, sure, worse, offset.sentence)
-    return say("{}: {} {}.", what, sure, worse)
+    return say("{}: {} {}.{}", what, sure, worse, "" if known is None else _at_speed(effect, *known))
+
+
+def _at_speed(effect: str, parameters: Mapping[str, Estimate], velocity: NDArray[np.float64]) -> Text | str:
+    """What a drag makes at the largest speed of the records, velocity [rad/s]; empty for other effects."""
+    curve = LIBRARY[effect].curve
+    if curve is None or LIBRARY[effect].levels or LIBRARY[effect].constant:
+        return ""
+    top = float(np.max(np.abs(velocity)))
+    torque = abs(float(curve(np.array([top]), {name: e.value for name, e in parameters.items()})[0]))
+    return say(" At the largest speed of the records, {:.3g} {rad/s}, it makes {:.3g} {N m}.", top, torque)
 
 
 def basis_of(found: Selection, left: bool) -> list[Text]:

@@ -99,6 +99,8 @@ def _left(dia: Diagnosis, axis: str) -> list[str]:
     verdict = "Nothing of it is significant." if dia.driver is None else typeset(left_words(dia, axis))
     parts: list[str] = [tag("h3", "What the rest depends on")]
     parts.append(tag("p", verdict, " BIC units gained by a free function of each; below 0 it is not worth its parameters."))
+    if dia.driver is None and dia.left_needed > 0.0:
+        parts.append(tag("p", f"Above {dia.left_needed:.0f} one counts."))
     if dia.driver is not None and not counts:
         parts.append(
             tag("p", f"Above {dia.left_needed:.0f} one counts. Of what does not, the closest takes most of the error away.")

@@ -15,7 +15,7 @@ from gaident.show.report.parts import Charts, Section, box, needs_record, senten
 from gaident.show.report.retuning_words import added_filters, asked_words, figure_rows, gain_rows
 from gaident.show.report.views import Beforehand, LoopCurves, Mended, Remedies, View
 from gaident.show.response_plots import phase_line
-from gaident.show.units import beside
+from gaident.show.units import Scales, beside
 
 __all__ = ["remedies_section"]
 
@@ -36,7 +36,7 @@ def remedies_section(view: View, drawn: Charts) -> Section:
         _doubts(do.doubts, axis),
         _gains(do, view, drawn),
         _feedforward(do, view),
-        _mended(do, axis),
+        _mended(do, view),
     )
 
 
@@ -171,19 +171,23 @@ def _waves(found: Beforehand, axis: str) -> Html:
     return table(("", f"periods {word('per turn', axis)}", f"sine [{force}]", f"cosine [{force}]"), [rows])
 
 
-def _mended(do: Remedies, axis: str) -> Html:
+def _mended(do: Remedies, view: View) -> Html:
+    axis = view.axis
     head, found = tag("h3", "If mended"), do.mended
     if found is None:
         return joined((head, _reason("What a repair brings is not shown", do.no_mended, axis)))
-    return joined((head, _table_of(found, axis)))
+    return joined((head, _table_of(found, axis, view.scales)))
 
 
-def _table_of(found: Mended, axis: str) -> Html:
+def _table_of(found: Mended, axis: str, scales: Scales) -> Html:
+    si = unit(found.unit, axis)
+
     def row(what: str, error: float) -> Row:
         fall = 1.0 - error / found.now if found.now > 0.0 and math.isfinite(error) else math.nan
-        return what, number(error), None if math.isnan(fall) else typeset(f"{round(100.0 * fall) + 0:d}")
+        less = "" if math.isnan(fall) else typeset(f"{round(100.0 * fall) + 0:d}")
+        return what, number(error), typeset(beside(scales, "", error, None, si)), less
 
-    rows: list[Row] = [("as it is", number(found.now), None)]
+    rows: list[Row] = [("as it is", number(found.now), typeset(beside(scales, "", found.now, None, si)), "")]
     hidden = found.now > 0.0 and any(abs(error / found.now - 1.0) < HIDDEN for error in found.without.values())
     if found.retuned is not None:
         rows.append(row("with the proposed gains", found.retuned))
@@ -197,5 +201,4 @@ def _table_of(found: Mended, axis: str) -> Html:
     )
     if hidden:
         text += f" A cause with 0 % does not show in it: the controller makes up for that with its {word('torque', axis)}."
-    columns = ("", f"following error [{unit(found.unit, axis)}]", "less by [%]")
-    return joined((tag("p", text), table(columns, [rows])))
+    return joined((tag("p", text), filled_table(("", f"following error [{si}]", "", "less by [%]"), rows)))
