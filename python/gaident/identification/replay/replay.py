@@ -150,8 +150,8 @@ def _compared(rec: Record, command: Vector, controller: Controller, logged: Vect
         return Replay(*figures, False, "", np.nan, departs, text)
     text = say(
         "{}, and none of the simple reasons explains it (start of the integrator, gains, scale, sign, rule of integration, "
-        "shift by samples, limits). Is this the controller, and are these the signals it saw? Of one that samples faster than the "
-        "log give its period.",
+        "shift by samples, limits). Is this the controller, and are these the signals it saw? Of one that samples faster than "
+        "the log give its period.",
         head,
     )
     return Replay(*figures, False, "", np.nan, departs, text)
