@@ -35,7 +35,7 @@ SOURCES := pyproject.toml CMakeLists.txt LICENSE README.md \
 ifndef SIDE_BY_SIDE
 .NOTPARALLEL:
 endif
-.PHONY: help install demo test fuzz bench real embedded wheel windows tidy docs lint test-cpp test-python test-long clean build-checked test-checked test-sanitized
+.PHONY: help install demo test fuzz bench real bare embedded wheel windows tidy docs lint test-cpp test-python test-long clean build-checked test-checked test-sanitized
 .DEFAULT_GOAL := help
 
 help: ## list the commands
@@ -89,9 +89,17 @@ bench: .venv/.tools ## build (plainly, without Python) and run the C++ benchmark
 	$(BIN)/cmake --build build/plain --target gaident_bench
 	build/plain/bench/gaident_bench $(BENCH_FLAGS)
 
-real: .venv/.tested ## measured drives diagnosed and fitted (GAIDENT_DATA); fails where an answer is worse than the table's
+real: .venv/.tested ## measured drives diagnosed and fitted (GAIDENT_DATA); fails where an answer is worse than the table's; REAL_FLAGS
 	@rm -f build/real.jsonl
-	$(BIN)/python bench/real.py --check --workers $(JOBS) --out build/real.jsonl
+	$(BIN)/python bench/real.py --check --workers $(JOBS) --out build/real.jsonl $(REAL_FLAGS)
+
+# From the objects of `test`: what stands in pyproject.toml for a build is in .venv already, and nothing else is.
+bare: .venv/.tested ## the package in an empty environment, with what it installs itself
+	@rm -rf build/bare
+	$(BIN)/python -m pip wheel --quiet --no-deps $(CHECKED) --wheel-dir build/bare .
+	$(PYTHON) -m venv build/bare/env
+	build/bare/env/bin/python -m pip install --quiet build/bare/*.whl
+	cd build/bare && env/bin/gaident --help > help.txt && env/bin/gaident doctor
 
 embedded: ## the search in a drive, on two emulated Cortex-M boards, and the recurrences on ARM64, compared bit for bit (docs/dsp.md)
 	@csrc/embedded/tools.sh
