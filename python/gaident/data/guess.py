@@ -14,7 +14,7 @@ from gaident.data.listing import ColumnInfo, Listing
 from gaident.data.record import CHANNELS
 from gaident.policy.table import POLICY
 
-__all__ = ["Guess", "guess_channels", "position_and_velocity", "unit_from_position", "unit_from_velocity"]
+__all__ = ["Guess", "guess_channels", "position_and_velocity", "slope_between", "unit_from_position", "unit_from_velocity"]
 
 
 @dataclass(frozen=True)

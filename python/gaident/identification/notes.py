@@ -7,6 +7,7 @@ from collections.abc import Sequence
 
 from gaident.axis import Text, joined, say
 from gaident.control.controller import Controller
+from gaident.data.guess import slope_between
 from gaident.data.record import Record
 from gaident.models.mechanics import OneMass, TwoMass
 from gaident.models.model import Model
@@ -100,12 +101,29 @@ def record_notes(records: Sequence[Record], controller: Controller | None, initi
 
 
 def reading_notes(records: Sequence[Record]) -> list[Text]:
-    """What was noticed when the logs were read, each sentence once, with the names of its records where not all have it."""
+    """What was noticed when the logs were read, and position and velocity of another scale.
+
+    Each sentence once, with the names of its records where not all have it.
+    """
     told: dict[str, list[str]] = {}
     for rec in records:
-        for note in dict.fromkeys(rec.notes):
+        for note in dict.fromkeys((*rec.notes, *_scale_notes(rec))):
             told.setdefault(note, []).append(rec.name)
     return [
         joined("", (f"{', '.join(filter(None, names))}: " if len(names) < len(records) and any(names) else "", note))
         for note, names in told.items()
     ]
+
+
+def _scale_notes(rec: Record) -> list[Text]:
+    """A sentence where position and velocity are of one motion, but not in the same unit."""
+    if rec.position is None:
+        return []
+    times, correlation = slope_between(rec.position, rec.velocity, rec.dt)
+    if correlation < POLICY.derivative or abs(times - 1.0) < POLICY.other_scale:
+        return []
+    text = (
+        "The logged position moves {:.3g} times as fast as the logged velocity says: a unit, a gear or pole pairs stand between "
+        "the two. {Inertia} and friction are those of the velocity; check which of them is right."
+    )
+    return [say(text, times)]

@@ -22,6 +22,9 @@ class Readings:
     resample_finer: float = reading(100.0, "1", "of a log's step over the given one: finer, the given step is in another unit")
     unit_shown: float = reading(0.02, "1", "relative difference up to which a slope shows a unit, a jump an integer's range")
     derivative: float = reading(0.98, "1", "correlation of a column with the slope of another, from which it is its derivative")
+    other_scale: float = reading(
+        0.05, "1", "share by which a velocity is off the slope of its position, from which the two have different units"
+    )
     derivative_samples: int = reading(
         20, "samples", "that a column has more than, to be looked at for it: few samples follow each other by chance"
     )

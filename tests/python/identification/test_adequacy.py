@@ -15,7 +15,7 @@ from clock import fastest
 from gaident.axis import said
 from gaident.errors import RecordError, SpaceError
 from gaident.identification.noise import chi2_tail
-from gaident.identification.notes import unseen_notes
+from gaident.identification.notes import reading_notes, unseen_notes
 
 DT = 0.444e-3
 ONE_MASS = ga.OneMass(J=2e-4, D=3e-3).model()
@@ -248,3 +248,19 @@ def test_a_resonance_above_what_the_log_shows_is_said_to_be_unseen() -> None:
     (note,) = unseen_notes(fast, 1e-3)
     assert "above 4e+02 Hz does not show" in note and "862 Hz stands for something else" in note
     assert unseen_notes(fast, 0.25e-3) == []
+
+
+def test_a_velocity_of_another_unit_than_its_position_is_said() -> None:
+    t = 0.01 * np.arange(2000)
+    velocity = np.sin(t) + np.sin(3.1 * t)
+    angle = np.cumsum(velocity) * 0.01
+
+    def told(velocity: np.ndarray, position: np.ndarray) -> list[str]:
+        rec = ga.Record(0.01, velocity=velocity, torque=velocity, position=position)
+        return [said(note, "linear") for note in reading_notes([rec]) if "as fast as the logged velocity" in note]
+
+    noise = 0.05 * np.random.default_rng(1).standard_normal(len(t))
+    assert not told(velocity, angle) and not told(velocity + noise, angle) and not told(1.02 * velocity, angle)
+    (note,) = told(velocity / 2.0, angle)
+    assert note.startswith("The logged position moves 2 times") and "Mass and friction" in note
+    assert not told(velocity, np.cos(40.0 * t)), "another motion is no unit"
