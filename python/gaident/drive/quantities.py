@@ -103,7 +103,10 @@ def si_number(value: Any, name: str, constants: Mapping[str, Any]) -> float | No
     if _checked(value, name, ControllerError).strip() == UNKNOWN:
         return None
     number, unit = number_and_unit(value)
-    _refuse_other_axis(value, name, unit, str(constants.get("axis", "rotary")))
+    if constants.get("screw") is not None and _of_axis(unit, "linear"):
+        number *= _by_screw(unit, float(constants["screw"]))  # N per A is N m per A here, as of a motor
+    else:
+        _refuse_other_axis(value, name, unit, str(constants.get("axis", "rotary")))
     size, constant = _units(name)[_spelling(unit)]
     needed = constant.split()
     for one in needed:
@@ -114,10 +117,25 @@ def si_number(value: Any, name: str, constants: Mapping[str, Any]) -> float | No
     return number * size * times / (over[0] if over else 1.0)
 
 
+def _of_axis(unit: str, axis: str) -> bool:
+    """Whether only a gain, torque or inertia of such an axis has this unit."""
+    return _spelling(unit) in map(_spelling, _OF_ONE_AXIS[axis])
+
+
+def _by_screw(unit: str, lead: float) -> float:
+    """What makes a number of the slide one of the motor, which moves the lead [m] in a turn: r = lead/(2 pi), v = r w, M = r F.
+
+    A mass and a force over a speed or a length have r^2; a force has r, and so has a current over a speed or a length.
+    """
+    r, plain = lead / math.tau, _spelling(unit)
+    over = plain == "kg" or plain.startswith("n/(") or plain in (_spelling("N s/m"), _spelling("N/m"))
+    return r * r if over else r
+
+
 def _refuse_other_axis(value: str, name: str, unit: str, axis: str) -> None:
     """Raises ControllerError for a unit that gains, torques and inertias of the other kind of axis have."""
     other = {"rotary": "linear", "linear": "rotary"}[axis]
-    if _spelling(unit) not in map(_spelling, _OF_ONE_AXIS[other]):
+    if not _of_axis(unit, other):
         return
     own = [u for u in _UNITS[name] if u in _OF_ONE_AXIS[axis]]
     screw = (

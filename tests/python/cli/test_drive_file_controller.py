@@ -83,6 +83,18 @@ CASES: dict[str, tuple[str, ga.PI | ga.Cascade]] = {
         '[controller]\nkp = 0.02\nki = 2\ntorque_filters = [{ kind = "low pass", frequency = "250 Hz" }]\n',
         ga.Cascade(SINAMICS, torque_filters=(ga.LowPass(1.0 / (2.0 * np.pi * 250.0)),)),
     ),
+    "gains of a slide, of a motor on a screw": (
+        'screw = "36 mm"\ntorque_constant = 0.94\n[controller]\nkp = "180 A/(m/s)"\nki = "12000 A/m"\n',
+        ga.PI(180 * (0.036 / (2 * np.pi)) * 0.94, 12000 * (0.036 / (2 * np.pi)) * 0.94),
+    ),
+    "forces of a slide, of a motor on a screw": (
+        'screw = "10 mm"\n[controller]\nkp = "2000 N s/m"\nki = "5e4 N/m"\ntorque_limit = "900 N"\n',
+        ga.PI(
+            2000 * ((0.01 / (2 * np.pi)) * (0.01 / (2 * np.pi))),
+            5e4 * ((0.01 / (2 * np.pi)) * (0.01 / (2 * np.pi))),
+            torque_limit=900 * (0.01 / (2 * np.pi)),
+        ),
+    ),
     "a bandwidth and an inertia": (
         '[controller]\nkp = "200 1/s"\ntotal_inertia = "1 kg cm^2"\ntn = 0.01\n',
         ga.PI(0.02, 2.0),

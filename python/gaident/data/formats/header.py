@@ -21,6 +21,7 @@ COMMENT = re.compile(r"\s*(#|//|%)")
 _BRACKETS = re.compile(r"(.*\S)\s*[\[(<{]([^\])>}]+)[\])>}]")
 _NOTED = re.compile(r"(.*\S)\s*\[([^\]]+)\]\s*\S.*")  # n_ist [1/min] (smoothed)
 _AFTER = re.compile(r"(.*\S)\s+(?:/|in)\s+(\S.*)")
+_PER = re.compile(r"([^/]*[^\s/])/([^\s/].*)")  # PosAct/mm, a quantity over its unit as ISO 80000-1 writes axes of figures
 LONGEST_TITLE = 1000  # no decision: a format: characters; a longer title is no name with a unit
 _ENCLOSED = re.compile(r"[\[(<{](.*)[\])>}]")
 
@@ -189,7 +190,7 @@ def _bare_unit(cell: str) -> str | None:
 
 
 def _split_unit(cell: str) -> tuple[str, str | None]:
-    """`w [rpm]`, `w (rpm)`, `w / rpm`, `n in rpm` -> (w, rpm).
+    """`w [rpm]`, `w (rpm)`, `w / rpm`, `n in rpm`, `w/rpm` -> (w, rpm).
 
     Square brackets always contain a unit, unless a number (`w[0]`); what else is enclosed counts if it is a
     known unit. Of the others `name_and_unit` knows those that end a name: speed_rpm.
@@ -204,4 +205,7 @@ def _split_unit(cell: str) -> tuple[str, str | None]:
         square = pattern is _BRACKETS and cell.endswith("]") and not unit.lstrip("+-").isdigit()
         if is_any_unit(unit) or square:
             return name, _bare_unit(unit)
-    return name_and_unit(cell) or (cell, None)
+    found, over = name_and_unit(cell), _PER.fullmatch(cell)
+    if found is None and over is not None and is_any_unit(over[2].strip()):
+        return over[1].strip(), _bare_unit(over[2].strip())
+    return found or (cell, None)

@@ -9,14 +9,16 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from gaident.axis import Text
+from gaident.axis import Text, say
+from gaident.control.cascade import cascade_of
 from gaident.control.controller import Controller
 from gaident.control.found import FoundNumbers
 from gaident.control.pi import PI, bare_pi
 from gaident.control.unknown import field_of
 from gaident.data.record import Record
+from gaident.data.torque_kind import MEASURED
 from gaident.diagnosis.controller.controller_place import AsLogged, as_logged
-from gaident.diagnosis.controller.form_findings import Loop, driver_of
+from gaident.diagnosis.controller.form_findings import Driver, Loop, driver_of
 from gaident.diagnosis.controller.limit_not_given import by_a_limit
 from gaident.diagnosis.controller.log_shift import Aligned, aligned
 from gaident.diagnosis.controller.measured_lag import Lag, behind_a_lag, commanded, lag_shown
@@ -33,6 +35,11 @@ from gaident.results.estimate import Estimate
 from gaident.results.finding import Finding
 
 __all__ = ["Driving", "driving_of"]
+
+MEASURED_ACTS = say(
+    "What acts on the shaft is the measured {torque}, behind the filters of it or the current loop: it drives the model, and no "
+    "loop is simulated."
+)
 
 Matrix = NDArray[np.float64]
 
@@ -193,13 +200,13 @@ def driving_of(
                 found = other.found
                 records, validation, origin = _again(records, validation, origin, partial(driven_by, controller=controller))
                 moved = aligned(records, validation, None, True)
-    if form is None and pi is None and driven.slower and not limited and not asked.findings:
-        assert controller is not None
-        measured = [origin.get(r.digest, r) for r in records]
-        if (behind := behind_a_lag(measured, controller)) is not None:
-            alone = _without_controller(measured, [origin.get(r.digest, r) for r in validation], asked)
-            said = (*(n for n in notes if n not in driven.notes), behind.note, *alone.notes)
-            return replace(alone, findings=(*findings, behind.finding), notes=said, numbers=numbers)
+    if controller is not None and pi is None and driven.slower and not limited:
+        notes_so_far = tuple(n for n in notes if n not in driven.notes)
+        shown = form or Driver((), (), cascade_of(controller), findings, (), numbers)
+        sought = form is None and not asked.findings
+        here, there = ([origin.get(r.digest, r) for r in part] for part in (records, validation))
+        if (alone := _by_what_was_measured(here, there, asked, shown, sought, notes_so_far)) is not None:
+            return alone
     if form is not None:
         controller, pi, notes, doubts = form.controller, None, (*notes, *form.notes), ()
         findings, numbers, found = form.findings, form.estimates, form.found
@@ -221,11 +228,25 @@ def driving_of(
     return Driving(moved, used, logged, findings, notes, doubts, numbers, limited, lag=lag, found=found, simulated=simulated)
 
 
-def _without_controller(records: Sequence[Record], validation: Sequence[Record], asked: Loop) -> Driving:
-    """Records whose logged torque drives the model by itself."""
+def _by_what_was_measured(
+    records: Sequence[Record], validation: Sequence[Record], asked: Loop, shown: Driver, sought: bool, notes: tuple[Text, ...]
+) -> Driving | None:
+    """Torques that were measured behind a filter of theirs, or the current loop, as they drive a model alone; None elsewhere.
+
+    records, validation: as they were given. shown: the controller from which they follow, with its findings. sought: whether a
+    lag that was not given is looked for. notes: on that controller.
+    """
+    if any(r.torque_is != MEASURED for r in records):
+        return None
+    behind = behind_a_lag(records, shown.controller) if sought else None
+    if behind is None and not shown.controller.torque_filters:
+        return None
     here, there = (tuple(on_lines(r, None) for r in part) for part in (records, validation))
     origin = {now.digest: r for now, r in zip((*here, *there), (*records, *validation), strict=True)}
-    return driving_of(here, there, Loop(None, asked.numbers), Driven(here, None), origin)
+    alone = driving_of(here, there, Loop(None, asked.numbers), Driven(here, None), origin)
+    lag, lag_note = ((), ()) if behind is None else ((behind.finding,), (behind.note,))
+    said = (*notes, *shown.notes, *lag_note, MEASURED_ACTS, *alone.notes)
+    return replace(alone, findings=(*shown.findings, *lag), notes=tuple(dict.fromkeys(said)), numbers=shown.estimates)
 
 
 def _again(

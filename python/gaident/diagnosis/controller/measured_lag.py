@@ -284,8 +284,7 @@ def behind_a_lag(records: Sequence[Record], given: Controller) -> Behind | None:
         return None
     text = (
         "The measured {torque} lags behind what the controller asks for, by a low pass of {} ms: with it that follows to "
-        "{:.2g} {N m} rms, without it to {:.2g} {N m}. That is the current loop, or a filter of it that was not given. What acts "
-        "on the shaft is the measured {torque}: it drives the model, and no loop is simulated."
+        "{:.2g} {N m} rms, without it to {:.2g} {N m}. That is the current loop, or a filter of it that was not given."
     )
     ms = 1e3  # no decision: a unit: in a second
     note, n = say(text, with_std(ms * time, ms * std), behind, without), sum(map(len, records))

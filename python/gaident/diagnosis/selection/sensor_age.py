@@ -54,6 +54,17 @@ __all__ = ["searched"]
 
 LEADS = (1e-3, 3e-3, 5e-3, 25e-3)  # no decision: m; those of ISO 3408-2, 1 to 40 mm, are these but for powers of two
 
+AHEAD = (
+    "The motion comes {:.2g} ms before a {torque} that is held over each line of the log, which no axis does: between the lines "
+    "the {torque} goes on, as that of a controller does that is faster than the log. The simulation has it; what is late by less "
+    "than half a line ({:.2g} ms) is not seen in this log. {}"
+)
+MEASURED_AHEAD = (
+    "The motion comes {:.2g} ms before a measured {torque} that is held over each line of the log: between the lines it goes on, "
+    "or it was filtered or written late on its way into the log. The simulation has it; what is late by less than half a line "
+    "({:.2g} ms) is not seen in this log. {}"
+)
+
 Vector = NDArray[np.float64]
 
 
@@ -77,11 +88,6 @@ def searched(
     every = 1 if controller is None else controller.log_every(data.dt)
     task = Task(objective, scales, model, tuple(allowed), lambda message: None)
     if every == 1 and (ahead := ahead_of_line(task)) is not None:
-        text = (
-            "The motion comes {:.2g} ms before a {torque} that is held over each line of the log, which no axis does: between "
-            "the lines the {torque} goes on, as that of a controller does that is faster than the log{}. The simulation has it; "
-            "what is late by less than half a line ({:.2g} ms) is not seen in this log. {}"
-        )
 
         def under(lines: float) -> Selection:
             near = (-lines - ahead.std, ahead.std - lines)
@@ -91,9 +97,8 @@ def searched(
         lines = closer(found, ahead)
         found = found if lines is None else under(lines)
         used = ahead.lag if lines is None else lines
-        late = ", or it was filtered or written late on its way into the log" if data.torque_measured else ""
         asked = "Log every sample." if controller is None else "Give the controller's period, or log every sample."
-        return found, [say(text, 1e3 * used * data.dt, late, 1e3 * HALF * data.dt, asked)]
+        return found, [say(MEASURED_AHEAD if data.torque_measured else AHEAD, 1e3 * used * data.dt, 1e3 * HALF * data.dt, asked)]
     age = 1e3 * HALF * data.dt / every
     read = np.split(objective.weight > 0.0, np.cumsum(data.lengths)[:-1])
     if all(is_difference_at_clock(r.velocity, r.position, data.dt, every, at) for r, at in zip(data.records, read, strict=True)):
