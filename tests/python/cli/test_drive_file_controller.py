@@ -84,7 +84,7 @@ CASES: dict[str, tuple[str, ga.PI | ga.Cascade]] = {
         ga.Cascade(SINAMICS, torque_filters=(ga.LowPass(1.0 / (2.0 * np.pi * 250.0)),)),
     ),
     "gains of a slide, of a motor on a screw": (
-        'screw = "36 mm"\ntorque_constant = 0.94\n[controller]\nkp = "180 A/(m/s)"\nki = "12000 A/m"\n',
+        'screw = 0.036\ntorque_constant = 0.94\n[controller]\nkp = "180 A/(m/s)"\nki = "12000 A/m"\n',
         ga.PI(180 * (0.036 / (2 * np.pi)) * 0.94, 12000 * (0.036 / (2 * np.pi)) * 0.94),
     ),
     "forces of a slide, of a motor on a screw": (
