@@ -95,7 +95,7 @@ class Work:
         self.controller = self.driving.controller
         self.pi = bare_pi(self.controller)
         self.notes: list[Text] = list(self.driving.logged.notes)
-        if self.controller is None or self.pi is not None:
+        if (self.controller is None or self.pi is not None) and not self.driving.ticks:
             self.notes += open_loop_notes(self.records, self.pi)
         of_log = [self.driving.outliers_in(r) for r in self.records]  # the records have what the controller read there
         others = [np.setdiff1d(left_out(r, self.idn.model, self.pi), h) for r, h in zip(self.records, of_log, strict=True)]
@@ -138,7 +138,7 @@ class Work:
             shown = [t for t in allowed if t.name not in unresolved(objective.data)], self._equivalent_here, self._say
             return selected(objective, self.scales, self.idn.model, *shown, min(most, self.most), beside)
 
-        found, older = searched(self.objective, self.scales, self.idn.model, allowed, search)
+        found, older = searched(self.objective, self.scales, self.idn.model, allowed, search, self.driving.ticks)
         self.notes += older
         self.not_testable |= unresolved(found.space.data)
         self.note(0.85, "looking for what is left")

@@ -37,6 +37,8 @@ def _filters(value: object, name: str) -> tuple[Mapping[str, Any], ...]:
 def _filter(data: Mapping[str, Any]) -> LowPass | Notch:
     """A filter; a low pass by its time constant or by the frequency at which it is 3 dB down, 1/(2 pi time_constant)."""
     numbers = {key: value if key == "kind" else si_number(value, key, {}) for key, value in data.items()}
+    if isinstance(data.get("frequency"), bool):
+        raise ControllerError(f"frequency is {data['frequency']!r}: give one number in Hz")
     if numbers.get("kind") == "low pass" and "frequency" in numbers:
         if "time_constant" in numbers:
             raise ControllerError("the low pass has time_constant and frequency: give the one or the other")

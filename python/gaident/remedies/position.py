@@ -22,10 +22,11 @@ def position_gain(search: Search, cascade: Cascade, asked: Asked) -> float | Non
     omega = position_frequencies(placed.period, POLICY.tuned_points)
     response = placed.response(omega)
     kept = []
-    for gain in 2.0 * np.pi * float(np.min(loops.bandwidths)) * GAINS:
+    gains, most = 2.0 * np.pi * float(np.min(loops.bandwidths)) * GAINS, asked.most[2]
+    for gain in np.append(gains[gains < most], most) if np.isfinite(most) else gains:
         L = gain * response
         margins = np.min(phase_margins(L)) >= asked.phase_margin and np.min(gain_margins(L)) >= asked.gain_margin
-        if gain > asked.most[2] or not (margins and placed.stable(gain).all()):
+        if not (margins and placed.stable(gain).all()):
             break
         kept.append(float(gain))
     own = Placed(placed.A[:1], placed.B[:1], placed.period)

@@ -332,6 +332,13 @@ def _controller_of(result: object, controller: Controller | None) -> Controller:
             "the controller has the continuous loop of the paper: gains are proposed for a digital controller; give "
             f"{arg('controller', 'PI(kp, ki)')}"
         )
+    lag = next((f for f in result.findings if f.effect == "torque_filter"), None) if isinstance(result, Diagnosis) else None
+    if lag is not None and result.controller is None and not cascade_of(given).torque_filters:
+        time = lag.parameters["time_constant"].value
+        raise SettingsError(
+            f"the diagnosis found a low pass of {1e3 * time:.3g} ms in the path of the torque, which its model does not contain "
+            f"and this controller lacks: give it, Cascade(..., torque_filters=(LowPass({time:.4g}),))"
+        )
     if given.unknown:
         raise SettingsError(f"controller has {given.unknown[0]}=None: give a number, or a result that found one")
     return given

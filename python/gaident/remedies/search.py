@@ -42,7 +42,7 @@ STEPPED = slice(0, 4)  # no decision: of a solver: drives whose largest torque t
 SMALLER = 0.97  # no decision: of a solver: a step towards gains that keep what was asked for
 UPPER = 90.0  # no decision: what an argument may be; deg
 DECIBELS = 40.0  # no decision: what an argument may be
-TOP = 0.88  # no decision: printed: of a gain as large as allowed; gains of a position controller are tried 12 % apart
+TOP = 0.999  # no decision: printed: of a gain as large as allowed
 AGAIN = 2  # no decision: of a solver: simplexes, each from the end of the one before, which edges stop
 TOLERANCE = 1e-3  # no decision: of a solver: ends the search; a thousandth of a gain
 
@@ -254,7 +254,8 @@ def most_of(given: Controller, times: float | None) -> tuple[float, float, float
     """kp, ki and gain of the position controller at most."""
     if times is None:
         return math.inf, math.inf, math.inf
-    if not (factor := real_number(times, "most_times", SettingsError, "give a number >= 1, or None")) >= 1.0:
+    factor = real_number(times, "most_times", SettingsError, "give a number >= 1, or None")
+    if isinstance(times, bool) or not factor >= 1.0:
         raise SettingsError(f"most_times is {times!r}: give a number >= 1, or None")
     own = cascade_of(given)
     gains = own.velocity.kp, own.velocity.ki, 0.0 if own.position is None else own.position.gain
@@ -269,8 +270,5 @@ def at_most(proposal: Cascade, asked: Asked, times: float | None) -> list[Text]:
         gain >= TOP * most for gain, most in ((proposal.velocity.kp, kp), (proposal.velocity.ki, ki), (position, place))
     ):
         return []
-    text = (
-        "No gain is raised to more than {:g} times the given one, although the margins would allow it: record the drive with "
-        "these gains, and go on from there."
-    )
+    text = "No gain is raised to more than {:g} times the given one: record the drive with these gains, and go on from there."
     return [say(text, times)]

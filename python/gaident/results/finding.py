@@ -79,7 +79,7 @@ class Bound:
     parameter : str
         The parameter that is its size, as in `gaident.effects.table()`.
     at_most : float
-        A larger one would have shown: estimate plus two standard deviations, beside all other parameters, in the axis' unit.
+        Its estimate plus two standard deviations, beside all other parameters.
     unit : str
         Its unit, on a rotary axis.
 

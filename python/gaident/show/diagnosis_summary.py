@@ -61,7 +61,7 @@ __all__ = [
     "verdict_words",
 ]
 
-NOT_THERE = "Not there: a larger one would have shown"
+NOT_THERE = "Not found, and at most (estimate and two deviations)"
 TESTED_UP_TO = "Tested up to what these records asked for"
 DRIVERS = {
     "velocity": "on the velocity",
@@ -338,7 +338,7 @@ def bound_rows(dia: Diagnosis, axis: str, scales: Scales) -> list[tuple[str, ...
 
 def _not_there(dia: Diagnosis, axis: str, scales: Scales) -> list[str]:
     rows = bound_rows(dia, axis, scales)
-    return [NOT_THERE, *table([(name, f"{size} below", *most) for name, size, *most in rows])] if rows else []
+    return [NOT_THERE, *table([(name, size, *most) for name, size, *most in rows])] if rows else []
 
 
 def _tested_up_to(dia: Diagnosis, axis: str) -> list[str]:

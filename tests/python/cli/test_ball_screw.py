@@ -94,7 +94,8 @@ def test_a_gain_of_the_other_kind_of_axis_is_refused_with_the_way_out(here: Path
     told = refusal(["diagnose", "run1.csv", "--drive", "drive.toml"], capsys)
     assert "kp is '0.6 N m s/rad', a unit of a rotary axis" in told
     assert 'give it in N s/m, or, of a motor on a screw, axis = "rotary" and screw = "10 mm"' in told
-    Path("drive.toml").write_text(DRIVE.replace("0.6 N m s/rad", "400 N s/m"))
+    without = DRIVE.replace('screw = "10 mm"\n', "").replace("0.6 N m s/rad", "400 N s/m")
+    Path("drive.toml").write_text(without)
     assert "a unit of a linear axis" in refusal(["diagnose", "run1.csv", "--drive", "drive.toml"], capsys)
     Path("drive.toml").write_text('axis = "linear"\n' + DRIVE.replace("0.6 N m s/rad", "400 N s/m"))
     assert "leave the one or the other out" in refusal(["diagnose", "run1.csv", "--drive", "drive.toml"], capsys)

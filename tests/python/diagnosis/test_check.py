@@ -262,7 +262,7 @@ def test_one_sine_leaves_the_inertia_open_to_a_torque_of_the_angle(axis: Any, te
     def notes(*omegas: float) -> list[str]:
         t, rng = 0.01 * np.arange(4000), np.random.default_rng(3)
         angle, w, a = (sum(f(x, t) for x in omegas) for f in (_angle, _velocity, _acceleration))
-        torque = 0.5 * a + 3.0 * w + 2.5 * np.sign(w) + 0.05 * rng.standard_normal(len(t))
+        torque = 0.5 * a + 3.0 * w + 2.5 * np.sign(w) + 0.2 * rng.standard_normal(len(t))
         rec = ga.Record(0.01, velocity=w, torque=torque, position=angle)
         return [said(n, axis) for n in inertia_rests_on(ga.inverse_dynamics(rec, axis=axis), [rec])]
 

@@ -340,3 +340,15 @@ def test_a_saved_regression_comes_back_as_it_was() -> None:
     np.testing.assert_array_equal(back.torque(rec), found.torque(rec))
     with pytest.raises(ga.GaidentError, match="damaged"):
         ga.InverseDynamics.from_dict({"terms": 1})
+
+
+@pytest.mark.parametrize("gravity", [0.5, 5.0])
+def test_gravity_on_one_sine_is_found_where_it_bends(gravity: float) -> None:
+    """Acceleration and angle go together, but a sine of the angle is no line, and with little noise both are known."""
+    t, rng = 0.002 * np.arange(6000), np.random.default_rng(2)
+    angle, w, a = 0.6 * np.sin(3.0 * t), 1.8 * np.cos(3.0 * t), -5.4 * np.sin(3.0 * t)
+    torque = 0.5 * a + 0.3 * w + 0.5 * np.sign(w) + gravity * np.sin(angle) + 0.02 * rng.standard_normal(len(t))
+    found = ga.inverse_dynamics(ga.Record(0.002, velocity=w, position=angle, torque=torque))
+    assert "gravity" in found.terms
+    inertia, amplitude = found.parameters["inertia"], found.parameters["gravity_amplitude"]
+    assert abs(inertia.value - 0.5) < 3.0 * inertia.std < 0.05 and abs(amplitude.value - gravity) < 3.0 * amplitude.std

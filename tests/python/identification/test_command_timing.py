@@ -12,6 +12,7 @@ from drive_rig import Noise, Plant, rig, skip_without_library
 from gaident.control.between import between_lines, unsure_between
 from gaident.identification.replay import command_timing
 from gaident.identification.replay.command_timing import timed
+from gaident.identification.replay.notes import jump_notes
 from gaident.identification.replay.timed_record import TimedRecord
 from loop_cases import PERIOD as T
 from loop_cases import jump_levels as levels
@@ -213,3 +214,14 @@ def test_friction_is_named_under_jumps_between_the_lines() -> None:
 def test_an_identification_takes_the_means_between_the_lines() -> None:
     idn = ga.identify(record(levels(8, 9), 8, LOOP), LOOP, seed=1)
     assert pytest.approx(8e-4, rel=5e-3) == idn.mechanics.J
+
+
+def test_jumps_before_their_line_are_counted_in_words() -> None:
+    command = np.repeat([0.0, 10.0, -5.0, 20.0], 50)
+    between = np.repeat(command[:, None], 4, axis=1)
+    between[49, 1:] = 10.0  # three samples early; the second jump stays on its line
+    between[149, 3:] = 20.0  # one sample early
+    rec = ga.Record(1e-3, command=command, velocity=0.9 * command, torque=command)
+    (note,) = jump_notes([TimedRecord.of(rec, between)])
+    assert str(note).startswith("Of 3 jumps of the velocity command 2 came before the line that shows them")
+    assert jump_notes([rec]) == [] and jump_notes([TimedRecord.of(rec, np.repeat(command[:, None], 4, axis=1))]) == []

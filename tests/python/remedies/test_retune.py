@@ -255,3 +255,10 @@ def test_gains_are_raised_no_further_than_asked(found: ga.Diagnosis, tuned: ga.R
     for wrong in (0.5, float("nan"), "3"):
         with pytest.raises(ga.GaidentError, match="most_times"):
             ga.retune(found, most_times=wrong)  # type: ignore[arg-type]
+
+
+def test_a_lag_that_the_model_does_not_contain_has_to_be_in_the_controller(found: ga.Diagnosis) -> None:
+    lag = ga.Finding("torque_filter", {"time_constant": ga.Estimate(8e-4, 1e-5, "s")}, place="controller")
+    driven = replace(found, controller=None, findings=(*found.findings, lag))
+    with pytest.raises(ga.GaidentError, match=r"low pass of 0.8 ms .* give it, .*LowPass\(0.0008\)"):
+        ga.retune(driven, ga.Cascade(GIVEN))

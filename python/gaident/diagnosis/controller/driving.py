@@ -56,6 +56,7 @@ class Driving:
     outliers: digest of a record as given -> lines whose velocity stands in the log alone, interpolated here.
     clocked: whether the sample time of the controller was given. left_open: whether some of its numbers were not.
     simulated: whether a simulated loop can have the controller.
+    ticks: samples to a line of a controller that is given and not used, as the measured torque drives the model; else 0.
     """
 
     moved: Aligned
@@ -73,6 +74,7 @@ class Driving:
     clocked: bool = False
     left_open: bool = False
     simulated: bool = True
+    ticks: int = 0
 
     def regained(self, other: OtherGains) -> Driving:
         """The same under other gains, which command and velocity show where no torque is logged; a finding says so."""
@@ -246,7 +248,10 @@ def _by_what_was_measured(
     alone = driving_of(here, there, Loop(None, asked.numbers), Driven(here, None), origin)
     lag, lag_note = ((), ()) if behind is None else ((behind.finding,), (behind.note,))
     said = (*notes, *shown.notes, *lag_note, MEASURED_ACTS, *alone.notes)
-    return replace(alone, findings=(*shown.findings, *lag), notes=tuple(dict.fromkeys(said)), numbers=shown.estimates)
+    ticks = shown.controller.log_every(records[0].dt)
+    return replace(
+        alone, findings=(*shown.findings, *lag), notes=tuple(dict.fromkeys(said)), numbers=shown.estimates, ticks=ticks
+    )
 
 
 def _again(

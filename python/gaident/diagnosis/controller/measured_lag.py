@@ -270,7 +270,8 @@ def behind_a_lag(records: Sequence[Record], given: Controller) -> Behind | None:
         return float(best.fun), float(np.exp(best.x)), older
 
     grid = np.log(records[0].dt * np.geomspace(POLICY.fastest_lag, POLICY.slowest_lag, LAG_TIMES))
-    behind, time, older = min(map(fitted, SAMPLES_LATE))
+    fits = sorted(map(fitted, SAMPLES_LATE))
+    behind, time, older = fits[0]
     without = run_error(records, cascade)
     if not behind < POLICY.each_number * without or not follow(records, lagging(time)):
         return None
@@ -280,6 +281,7 @@ def behind_a_lag(records: Sequence[Record], given: Controller) -> Behind | None:
     sample = records[0].dt / cascade.log_every(records[0].dt)
     # Within a sample of the controller it is not known when the current is measured, and when the next command acts.
     std = float(np.hypot(time_std(records, lagging, time, older), sample / np.sqrt(12.0)))
+    time = float(np.mean([other for left, other, _ in fits if np.isfinite(left)]))
     if not time > POLICY.check_deviations * std:
         return None
     text = (

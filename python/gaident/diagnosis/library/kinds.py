@@ -87,7 +87,6 @@ def tone(effect: str, **known: Any) -> Cause:
         lambda s: [],
         lambda s: (0.05 * s.torque, 0.05 * s.torque, 0.02 / s.duration),
         in_time=True,
-        from_nothing=True,
         scales={"phase": PHASE},
         **known,
     )

@@ -45,6 +45,7 @@ from gaident.estimation import least_squares as ls
 from gaident.estimation.dataset import DataSet
 from gaident.estimation.noise_model import WHITE
 from gaident.estimation.objective import Fit, Innovations, Objective
+from gaident.estimation.regression.torque_lag import TorqueLag
 from gaident.estimation.term import Scales, Term
 from gaident.models.drive_torque import HALF
 from gaident.models.model import Model
@@ -74,11 +75,14 @@ def searched(
     model: Model,
     allowed: Sequence[Term],
     search: Callable[[Objective, int, Fit | None], Selection],
+    ticks: int = 0,
 ) -> tuple[Selection, list[Text]]:
     """What a search selects over records whose velocity is as old as they show, with a note on that.
 
     allowed: the effects that are searched for.
     search: of these records, with at most so many effects; what it ends with is compared with a model that is given.
+    ticks: samples to a line of a controller that is not simulated, while the torque that was measured on the lines drives the
+    model: the mean over a line of what is measured at its begin comes half a line late, a differenced velocity half a sample.
     """
     most = POLICY.most_effects
     data = objective.data
@@ -87,16 +91,20 @@ def searched(
         return search(objective, most, None), []
     every = 1 if controller is None else controller.log_every(data.dt)
     task = Task(objective, scales, model, tuple(allowed), lambda message: None)
-    if every == 1 and (ahead := ahead_of_line(task)) is not None:
+    ahead = ahead_of_line(task) if every == 1 else None
+    if ahead is None and ticks > 1:
+        ahead = TorqueLag(HALF - HALF / ticks, HALF / ticks, 0.0)
+    if ahead is not None:
+        lag = ahead
 
         def under(lines: float) -> Selection:
-            near = (-lines - ahead.std, ahead.std - lines)
+            near = (-lines - lag.std, lag.std - lines)
             return search(Objective(data.aged(-lines, near), objective.weight, counter=objective.counter), most, None)
 
-        found = under(ahead.lag)
-        lines = closer(found, ahead)
+        found = under(lag.lag)
+        lines = closer(found, lag)
         found = found if lines is None else under(lines)
-        used = ahead.lag if lines is None else lines
+        used = lag.lag if lines is None else lines
         asked = "Log every sample." if controller is None else "Give the controller's period, or log every sample."
         return found, [say(MEASURED_AHEAD if data.torque_measured else AHEAD, 1e3 * used * data.dt, 1e3 * HALF * data.dt, asked)]
     age = 1e3 * HALF * data.dt / every

@@ -139,7 +139,7 @@ def inverse_dynamics(
     n_eff = _effective({c: lefts[c] for c in possible}, fits)
     squares = {c: squares[c] for c in possible}
     scores = {c: bic(squares[c] / count, n_eff, _count(c)) for c in possible}
-    chosen = _told_apart(_material(min(possible, key=lambda c: (scores[c], len(c))), squares), rows, lefts)
+    chosen = _material(min(possible, key=lambda c: (scores[c], len(c))), squares)
     (theta, rank), left = fits[chosen], lefts[chosen]
     X = [r.of(chosen) for r in rows]
     cov = covariance(X, left)
@@ -260,18 +260,6 @@ def _material(best: tuple[str, ...], squares: dict[tuple[str, ...], float]) -> t
         if other in squares and squares[best] > (1.0 - POLICY.material_column) * squares[other]:
             best = other
     return best
-
-
-def _told_apart(best: tuple[str, ...], rows: Sequence[Rows], lefts: dict[tuple[str, ...], list[Vector]]) -> tuple[str, ...]:
-    """The best choice without gravity or spring, where beside it the inertia is known `opened` times worse.
-
-    On one sine the two columns are nearly one, and what the filter leaves at the reversals shares the torque between them.
-    """
-    simpler = _without_angle(best)
-    if simpler == best or simpler not in lefts:
-        return best
-    own, alone = (covariance([r.of(c) for r in rows], lefts[c])[0, 0] for c in (best, simpler))
-    return simpler if own > POLICY.opened**2 * alone else best
 
 
 def _without_angle(terms: tuple[str, ...]) -> tuple[str, ...]:

@@ -7,11 +7,10 @@ import math
 from collections.abc import Callable, Mapping
 
 from gaident.axis import said, unit, velocity_unit, word
-from gaident.models.effect_rows import end_words
 from gaident.models.factors import gain_unit
 from gaident.results.diagnosis import Diagnosis
 from gaident.results.estimate import Estimate
-from gaident.results.finding import Finding
+from gaident.results.finding import Finding, where
 from gaident.show.diagnosis_summary import (
     NOT_THERE,
     TESTED_UP_TO,
@@ -176,7 +175,7 @@ def _causes(dia: Diagnosis, view: View) -> Section:
         name = joined((tag("b", cause_words(f, dia, axis)), *(joined((" or ", tag("b", other))) for other in others)))
         rows: list[Row] = [(n, *map(typeset, cells), remark) for n, *cells, remark in map(_row(view), f.parameters.items())]
         kind = "in-sample" if dia.in_sample else "held-out"
-        place = f"Place: {f.place}{f', {ends}' if (ends := end_words(f.sides)) else ''}. " if f.place else ""
+        place = f"Place: {f.place}{f', {ends}' if (ends := where(f, dia.model)) else ''}. " if f.place else ""
         figures = f"{place}{f.delta_bic:.0f} BIC units; {kind} error against that before it: {step_words(f.gain)}."
         parts.append(
             box(
@@ -246,7 +245,7 @@ def _untested(dia: Diagnosis, view: View) -> Section:
     else:
         parts.append(tag("p", "Every effect of the library could have shown itself in this record."))
     if rows := bound_rows(dia, view.axis, view.scales):
-        text = "These were tested and not found. A larger one than stands here would have shown, at 98 %."
+        text = "These were tested and not found. At most is the size estimated for each, and two of its deviations."
         shown: list[Row] = [(name, size, most, typeset(u), typeset(more)) for name, size, most, u, more in rows]
         parts += [tag("h3", NOT_THERE), tag("p", text), table(("effect", "its size", "at most", "", ""), [shown])]
     if dia.one_sided:

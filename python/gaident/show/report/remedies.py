@@ -112,7 +112,7 @@ def _step_chart(loops: tuple[LoopCurves, ...], axis: str) -> Chart | None:
     if not traces:
         return None
     end = max(float(t.x[-1]) for t in traces)
-    text = "Answer of the linear loop to a step of the velocity command by 1, without limits."
+    text = f"Answer of the linear loop to a step of the velocity command by 1 {velocity_unit(axis)}, without limits."
     if len(traces) < len(loops):
         text += " The loop before is not stable and not drawn."
     panel = Panel(f"velocity [{velocity_unit(axis)}]", traces)
