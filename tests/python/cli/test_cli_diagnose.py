@@ -72,6 +72,7 @@ def test_variations_of_the_log_are_printed_and_stand_in_the_page(
     assert main(["report", "dia.json", "--out", "again.html", "--pictures"]) == 0
     assert "Is it beyond doubt?" in Path("again.html").read_text(encoding="utf-8")
     asked.clear()
+    capsys.readouterr()
     assert main(["diagnose", "run0.csv", *LOOP, "--stability", "--json"]) == 0
     assert [v["what"] for v in json.loads(capsys.readouterr().out)["stability"]["variations"]] == ["first half", "second half"]
     assert main(["diagnose", "run0.csv", *LOOP, "--json"]) == 0

@@ -62,7 +62,9 @@ def test_a_given_identification_is_not_replaced_in_silence() -> None:
     rec, given = record(), ga.PI(TRUE.kp, 0.85 * TRUE.ki)
     idn = ga.identify(rec, given)
     dia = ga.diagnose(rec, given, idn)
-    assert dia.identification.controller != given and any("another one, under the gains that were found" in n for n in dia.notes)
+    assert dia.identification.controller != given and any(
+        "another one, under that controller, is in its place" in n for n in dia.notes
+    )
     assert dia.causes[0].delta_bic > 100.0
     right = ga.identify(rec, TRUE)
     assert not any("another one" in n for n in ga.diagnose(rec, TRUE, right).notes)
