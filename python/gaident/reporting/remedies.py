@@ -32,8 +32,8 @@ from gaident.show.report.views import Mended, Remedies
 
 __all__ = ["remedies_of"]
 
-NO_LOOP = say("no controller is known, so that there is no loop")
-NO_CONTROLLER = say("no controller is known")
+NO_LOOP = say("no controller is simulated in this result, so that there is no loop")
+NO_CONTROLLER = say("no controller is simulated in this result: its torque drives the model")
 NOT_ON_THIS = say("what is said above stands against this model")
 NO_COMMAND = say("the record has no command that the loop follows")
 RUNS_AWAY = say("the simulated loop runs away on this record")
