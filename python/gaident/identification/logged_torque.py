@@ -195,8 +195,9 @@ def corrected(records: Sequence[Record], controller: Controller) -> Corrected | 
             continue
         if all(abs(e.value - _given(of, n)) <= POLICY.check_deviations * e.std for n, e in numbers.estimates.items()):
             continue  # none of them is another number than the given one
-        if any(name in FEEDFORWARDS and e.value < 0.0 for name, e in numbers.estimates.items()):
-            late = _late(records, of)  # no drive brakes where its command asks for acceleration
+        negative = [name for name, e in numbers.estimates.items() if name in FEEDFORWARDS and e.value < 0.0]
+        if negative:  # no drive brakes where its command asks for acceleration
+            late = _late(records, of) if "acceleration_feedforward" in negative else None
             found += [] if late is None else [late]
             continue
         values = [_value(name, e) for name, e in numbers.estimates.items()]

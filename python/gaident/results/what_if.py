@@ -177,7 +177,7 @@ class WhatIf(SavedResult):
         Parameters
         ----------
         rec : Record
-            A record that was given to `diagnose`, or any other, which is returned as it is.
+            A record that was given to `diagnose`, or another one of the same loop.
 
         Returns
         -------
