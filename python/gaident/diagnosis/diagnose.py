@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -164,13 +164,14 @@ def diagnose(
         def driven_under(one: _Prepared) -> Driving:
             clocked = controller is not None and controller.clock is not None
             left_open = controller is not None and bool(controller.unknown)
-            return replace(one.driving(), outliers=hit, clocked=clocked, left_open=left_open)
+            found = one.driving()
+            known: dict[str, Any] = dict(outliers=hit, clocked=clocked, left_open=left_open)
+            return replace(found, **known, by_loop=found.by_loop and replace(found.by_loop, **known))
 
         driving = driven_under(prepared[0])
         note(0.02, "identifying the linear model")
 
         linear_under: dict[int, tuple[Driving, Identification]] = {}
-        discarded: list[Text] = []  # what the torque alone shows of the controller, and the model does not
 
         def identified(driving: Driving) -> Identification:
             """The linear model under a controller, identified once."""
@@ -209,9 +210,9 @@ def diagnose(
                     return ruled
             return work
 
-        def under_best_controller(most: int, idn: Identification | None) -> Work:
+        def under_best_controller(driving: Driving, most: int, idn: Identification | None) -> _Ended:
             """The work with at most so many effects, under the controller with which it explains the records."""
-            discarded.clear()
+            discarded: list[Text] = []
             work = searched(driving, most, idn)
             if (form := work.other_form()) is not None:
                 note(0.03, "once more, under another form of controller")
@@ -244,12 +245,16 @@ def diagnose(
                 work = given_work
                 work.accept(stands)
             work.with_joint_numbers()
-            return work
+            return _Ended(work, work.report(seed), discarded)
 
         linear = identification
         for most in range(1 if quick else POLICY.most_effects, POLICY.most_effects + 1):
-            work = under_best_controller(most, linear)
-            found = work.report(seed)
+            work, found, discarded = under_best_controller(driving, most, linear)
+            if found.driver is not None and driving.by_loop is not None:
+                note(0.03, "once more, driven by what the controller makes")
+                looped = under_best_controller(driving.by_loop, most, None)
+                if looped.found.driver is None:
+                    work, found, discarded = looped
             if found.causes or found.driver is None:
                 break
             linear = linear if work.driving.regained_from is not None else work.idn  # a name needs more than one effect here
@@ -283,6 +288,14 @@ def diagnose(
             space = work.found.space
             result = with_p_value(result, space, work.base, work.final, bootstrap, seed, lambda message: note(None, message))
     return replace(result, seconds=time.perf_counter() - began)
+
+
+class _Ended(NamedTuple):
+    """A search that has ended, its report, and what the torque alone shows of the controller, and the model does not."""
+
+    work: Work
+    found: Diagnosis
+    discarded: list[Text]
 
 
 class _Prepared(NamedTuple):

@@ -38,6 +38,7 @@ WIDEST = np.radians(88.0)  # no decision: a grid: of the phase of a resonance, a
 EVEN = 80  # no decision: a grid: frequencies evenly apart, of an integral up to half the sampling frequency
 BAND = np.sqrt(0.5)  # no decision: a formula: -3 dB, the edge of a bandwidth
 SETTLED = 0.05  # no decision: a formula: the band about its end in which a step has settled, 5 % by definition
+BELOW = 0.5  # no decision: of a solver: of the largest torque so far, below which that of a step stays once it has passed it
 LONG_ENOUGH = 64  # no decision: of a solver: samples of a step after which the torque may have passed its largest value
 FALLEN = 16.0  # no decision: a formula: time constants of the slowest pole, by which nothing is left of a step
 
@@ -168,7 +169,7 @@ class Loops:
         for states in _doubled(A[:, :-1, :-1], B[:, :-1, 0]):
             velocity = np.einsum("sn,skn->sk", self.plants.H, states[:, :, :n])
             torque = float(np.max(np.abs(states[:, :, n : n + m] @ Ac.C + Ac.D[0] + Ac.D[1] * velocity)))
-            if torque < 0.5 * largest and states.shape[1] >= LONG_ENOUGH:
+            if torque < BELOW * largest and states.shape[1] >= LONG_ENOUGH:
                 break
             largest = max(largest, torque)
         return largest

@@ -11,6 +11,8 @@ from gaident.show.wording import WIDTH, number, table
 
 __all__ = ["retuning_summary"]
 
+GAINS = ("", "before", "proposed", "")  # head of the table of gains
+
 
 def retuning_summary(result: Retuning, axis: str = "rotary") -> str:
     """Doubts first, then the gains, the loop before and after, what a simulation found, and notes."""
@@ -27,7 +29,7 @@ def retuning_summary(result: Retuning, axis: str = "rotary") -> str:
 
 
 def _gains(result: Retuning, axis: str) -> list[str]:
-    rows: list[tuple[str, ...]] = [("", "before", "proposed", ""), *(row[:4] for row in gain_rows(result, axis, {}))]
+    rows: list[tuple[str, ...]] = [GAINS, *(row[: len(GAINS)] for row in gain_rows(result, axis, {}))]
     added = [f"  added: {one}" for one in added_filters(result)]
     return ["Gains", *table(rows), *added, *textwrap.wrap(asked_words(result, axis), WIDTH)]
 

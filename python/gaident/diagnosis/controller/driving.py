@@ -57,6 +57,7 @@ class Driving:
     clocked: whether the sample time of the controller was given. left_open: whether some of its numbers were not.
     simulated: whether a simulated loop can have the controller.
     ticks: samples to a line of a controller that is given and not used, as the measured torque drives the model; else 0.
+    by_loop: where it does, the same with the torque that the controller makes in its place.
     """
 
     moved: Aligned
@@ -75,6 +76,7 @@ class Driving:
     left_open: bool = False
     simulated: bool = True
     ticks: int = 0
+    by_loop: Driving | None = None
 
     def regained(self, other: OtherGains) -> Driving:
         """The same under other gains, which command and velocity show where no torque is logged; a finding says so."""
@@ -202,13 +204,12 @@ def driving_of(
                 found = other.found
                 records, validation, origin = _again(records, validation, origin, partial(driven_by, controller=controller))
                 moved = aligned(records, validation, None, True)
-    if controller is not None and pi is None and driven.slower and not limited:
-        notes_so_far = tuple(n for n in notes if n not in driven.notes)
-        shown = form or Driver((), (), cascade_of(controller), findings, (), numbers)
-        sought = form is None and not asked.findings
+    slower = controller is not None and pi is None and driven.slower and not limited
+    if slower and form is None and not asked.findings:
+        assert controller is not None
         here, there = ([origin.get(r.digest, r) for r in part] for part in (records, validation))
-        if (alone := _by_what_was_measured(here, there, asked, shown, sought, notes_so_far)) is not None:
-            return alone
+        if (lagging := behind_a_lag(here, there, controller)) is not None:
+            form = replace(lagging, findings=(*findings, *lagging.findings), estimates=numbers)
     if form is not None:
         controller, pi, notes, doubts = form.controller, None, (*notes, *form.notes), ()
         findings, numbers, found = form.findings, form.estimates, form.found
@@ -227,30 +228,31 @@ def driving_of(
     if pi is None or any(replay(r, pi).follows is False for r in records if r.digest not in moved.shifts):
         notes = (*asked.period_notes, *notes)
     simulated = form is None or form.simulated
-    return Driving(moved, used, logged, findings, notes, doubts, numbers, limited, lag=lag, found=found, simulated=simulated)
+    made = Driving(moved, used, logged, findings, notes, doubts, numbers, limited, lag=lag, found=found, simulated=simulated)
+    if slower and used is not None and cascade_of(used).torque_filters and all(r.torque_is == MEASURED for r in made.read):
+        return _by_what_was_measured(made, asked, driven.notes)
+    return made
 
 
-def _by_what_was_measured(
-    records: Sequence[Record], validation: Sequence[Record], asked: Loop, shown: Driver, sought: bool, notes: tuple[Text, ...]
-) -> Driving | None:
-    """Torques that were measured behind a filter of theirs, or the current loop, as they drive a model alone; None elsewhere.
+def _by_what_was_measured(made: Driving, asked: Loop, not_said: Sequence[Text]) -> Driving:
+    """Torques that were measured behind a filter of theirs, or the current loop, as they drive a model alone.
 
-    records, validation: as they were given. shown: the controller from which they follow, with its findings. sought: whether a
-    lag that was not given is looked for. notes: on that controller.
+    made: the same records as the torque of their controller drives it. not_said: notes on that torque.
     """
-    if any(r.torque_is != MEASURED for r in records):
-        return None
-    behind = behind_a_lag(records, shown.controller) if sought else None
-    if behind is None and not shown.controller.torque_filters:
-        return None
-    here, there = (tuple(on_lines(r, None) for r in part) for part in (records, validation))
-    origin = {now.digest: r for now, r in zip((*here, *there), (*records, *validation), strict=True)}
+    given = made.moved.given
+    whole = [[given[r.digest] for r in part] for part in made.driven]
+    here, there = (tuple(on_lines(r, None) for r in part) for part in whole)
+    origin = {now.digest: r for now, r in zip((*here, *there), (*whole[0], *whole[1]), strict=True)}
     alone = driving_of(here, there, Loop(None, asked.numbers), Driven(here, None), origin)
-    lag, lag_note = ((), ()) if behind is None else ((behind.finding,), (behind.note,))
-    said = (*notes, *shown.notes, *lag_note, MEASURED_ACTS, *alone.notes)
-    ticks = shown.controller.log_every(records[0].dt)
+    said = (*(n for n in made.notes if n not in not_said), MEASURED_ACTS, *alone.notes)
+    assert made.controller is not None
     return replace(
-        alone, findings=(*shown.findings, *lag), notes=tuple(dict.fromkeys(said)), numbers=shown.estimates, ticks=ticks
+        alone,
+        findings=made.findings,
+        notes=tuple(dict.fromkeys(said)),
+        numbers=made.numbers,
+        ticks=made.controller.log_every(here[0].dt),
+        by_loop=None if made.doubts else made,
     )
 
 

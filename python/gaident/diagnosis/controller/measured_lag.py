@@ -23,7 +23,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -37,11 +36,13 @@ from gaident.control.pi import PI
 from gaident.control.pi_torque import pi_torque
 from gaident.data.record import Record
 from gaident.data.torque_kind import COMMANDED, MEASURED, SAMPLE
+from gaident.diagnosis.controller.form_findings import Driver
 from gaident.diagnosis.controller.slow_forms import follow, run_error, time_std
 from gaident.estimation.criterion import bic, gained
 from gaident.identification.logged_torque import comparable
 from gaident.identification.replay.causes import white_noise
 from gaident.identification.replay.replay import replay
+from gaident.models.drive_torque import driven_by
 from gaident.policy.table import POLICY
 from gaident.results.estimate import Estimate
 from gaident.results.finding import Finding
@@ -234,15 +235,7 @@ def _without(parts: Sequence[_Part], controller: PI) -> float:
     return best
 
 
-class Behind(NamedTuple):
-    """A low pass behind which a measured torque follows from its controller, which has it here; the finding and a note on it."""
-
-    controller: Cascade
-    finding: Finding
-    note: Text
-
-
-def behind_a_lag(records: Sequence[Record], given: Controller) -> Behind | None:
+def behind_a_lag(records: Sequence[Record], validation: Sequence[Record], given: Controller) -> Driver | None:
     """The given controller with a low pass in the path of its torque, where measured torques of a slower log show one; else None.
 
     A motor's current lags behind what its controller asks for, by the current loop or by a filter.
@@ -292,7 +285,8 @@ def behind_a_lag(records: Sequence[Record], given: Controller) -> Behind | None:
     note, n = say(text, with_std(ms * time, ms * std), behind, without), sum(map(len, records))
     lag = {"time_constant": Estimate(time, std, "s")}
     finding = Finding("torque_filter", lag, (), 0.0, gained(n * without**2, n * behind**2, n, 1), None, note, place="controller")
-    return Behind(lagging(time), finding, note)
+    driven, later = (tuple(driven_by(r, lagging(time)) for r in part) for part in (records, validation))
+    return Driver(driven, later, lagging(time), (finding,), (note,), {})
 
 
 def _late_by_lines(records: Sequence[Record], cascade: Cascade, lines: int) -> float:
