@@ -130,7 +130,8 @@ def slow_record(
     levels = np.array([0.0, 30.0, 60.0, 12.0, -24.0, -60.0, -18.0, 6.0, 42.0, 0.0, 3.0, -3.0, 0.0])
     before, ramp = np.append(0.0, levels[:-1]), 0.125 * np.arange(800)
     ramps = np.concatenate([a + np.clip(b - a, -ramp, ramp) for a, b in zip(before, levels, strict=True)])
-    log = log_of(plant, ramps, effects or {"coulomb_friction": {"torque": 0.1}}, Noise(white=0.0, encoder=2 * np.pi / 2**20), seed)
+    noises = Noise(white=0.0, encoder=2 * np.pi / 2**20)
+    log = log_of(plant, ramps, effects or {"coulomb_friction": {"torque": 0.1}}, noises, seed)
     assert log.torque is not None
     torque = log.torque + noise * np.random.default_rng(seed).standard_normal(len(log))
     return log.with_channels(torque=torque, torque_is="measured")
@@ -179,7 +180,7 @@ def test_a_lag_behind_the_current_of_a_slow_log_is_found_with_the_friction() -> 
 
 @pytest.mark.long
 def test_where_the_measured_torque_alone_leaves_something_the_torque_of_the_controller_behind_the_lag_drives_the_model() -> None:
-    """Between two lines in which a stuck shaft begins to move the measured torque, of 0.5 ms and with noise, does not tell enough."""
+    """Between two lines the measured torque does not tell enough of a stuck shaft that begins to move."""
     friction = {"torque": 0.1, "static_torque": 0.16, "stribeck_velocity": 2.0}
     dia = ga.diagnose(slow_record(0.65e-3, 0.01, seed=1, effects={"stribeck_friction": friction}), CASCADE)
     found = {f.effect: f.parameters for f in dia.causes}

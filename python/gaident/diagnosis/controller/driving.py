@@ -18,7 +18,7 @@ from gaident.control.unknown import field_of
 from gaident.data.record import Record
 from gaident.data.torque_kind import MEASURED
 from gaident.diagnosis.controller.controller_place import AsLogged, as_logged
-from gaident.diagnosis.controller.form_findings import Driver, Loop, driver_of
+from gaident.diagnosis.controller.form_findings import Loop, driver_of
 from gaident.diagnosis.controller.limit_not_given import by_a_limit
 from gaident.diagnosis.controller.log_shift import Aligned, aligned
 from gaident.diagnosis.controller.measured_lag import Lag, behind_a_lag, commanded, lag_shown
