@@ -265,6 +265,7 @@ def diagnose(
             noise=noise_std,
             bootstrap=bootstrap,
             controller_numbers=driving.numbers,
+            given_controller=controller,
             velocity_age=work.data.age,
             linear_model=work.base.parameters.model(work.base.x) if own else work.idn.model,
         )

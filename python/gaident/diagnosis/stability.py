@@ -1,6 +1,6 @@
 """Whether what a diagnosis named is named again, when its records are varied a little.
 
-Each variation is diagnosed like the records themselves:
+Each variation is diagnosed like the records themselves, under the controller that was given:
 
     a part of them            the first half, the middle half, the second half of each
     half as many lines        every second line where a digital controller's torque is logged; else behind a low-pass
@@ -47,7 +47,7 @@ def stability(
     """See `Diagnosis.stability`."""
     if progress is not None and not callable(progress):
         raise SettingsError(f"progress is {progress!r}: give a function of (fraction, message), or None")
-    varied = list(_varied(records, dia.controller, dia.seed))
+    varied = list(_varied(records, dia.given_controller, dia.seed))
     found = []
     for i, (what, make, controller, seed) in enumerate(varied):
 

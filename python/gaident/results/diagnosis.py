@@ -31,7 +31,10 @@ __all__ = ["Diagnosis"]
 SCHEMA = "gaident/diagnosis"
 SCHEMA_VERSION = 1  # no decision: a format: its version
 WORK = ("seed", "seconds", "simulations", "samples")
-PARTS = ("model", "identification", "next_experiment", "controller", "regression", "linear_model", "relevance", "varied")
+PARTS = (
+    *("model", "identification", "next_experiment", "controller", "given_controller"),
+    *("regression", "linear_model", "relevance", "varied"),
+)
 SINCE_0_1: Mapping[str, Any] = {
     **{"noise": None, "bootstrap": 0, "torque_logged": False, "loop_follows": True, "velocity_age": 0.0},
     **{"regression_force_error": None, "left_needed": 0.0, "axis": "rotary"},
@@ -78,6 +81,8 @@ class Diagnosis(WhatIf):
         The linear model that the diagnosis began with.
     controller : PI, Cascade or None
         The controller as it was used: with the gains, or of the form, that the logged torque shows.
+    given_controller : PI, Cascade or None
+        The controller as it was given to `diagnose`; in files of gaident 0.1.0 as it was used.
     seed : int
         The seed.
     seconds : float
@@ -190,6 +195,7 @@ class Diagnosis(WhatIf):
     not_there: Mapping[str, Bound] = field(default_factory=dict, hash=False)
     expected: Mapping[str, tuple[float, float]] = field(default_factory=dict, hash=False)
     varied: Stability | None = None
+    given_controller: Controller | None = None
     records: tuple[Record, ...] = field(default=(), compare=False, repr=False)
     validation_records: tuple[Record, ...] = field(default=(), compare=False, repr=False)
 
@@ -355,7 +361,8 @@ class Diagnosis(WhatIf):
                 left=data["left"],
                 notes=tuple(restored(note, linear) for note in data["notes"]),
                 identification=Identification.from_dict(data["identification"]),
-                controller=None if data["controller"] is None else controller_of(data["controller"]),
+                controller=_controller(data["controller"]),
+                given_controller=_controller(data.get("given_controller", data["controller"])),
                 **{name: data[name] for name in WORK},
                 **{name: data.get(name, lacking) for name, lacking in SINCE_0_1.items()},
                 digests=tuple(data["digests"]),
@@ -377,3 +384,7 @@ class Diagnosis(WhatIf):
                 varied=None if data.get("varied") is None else Stability.from_dict(data["varied"]),
                 controller_numbers={name: Estimate(**e) for name, e in data.get("controller_numbers", {}).items()},
             )
+
+
+def _controller(data: Mapping[str, Any] | None) -> Controller | None:
+    return None if data is None else controller_of(data)

@@ -176,6 +176,9 @@ def test_a_lag_behind_the_current_of_a_slow_log_is_found_with_the_friction() -> 
     assert found["torque_filter"]["time_constant"].value == pytest.approx(0.8e-3, rel=0.02)
     assert found["coulomb_friction"]["torque"].value == pytest.approx(0.1, rel=0.01)
     assert dia.mechanics["inertia"].value == pytest.approx(1e-3, rel=0.005)
+    assert dia.given_controller == CASCADE and dia.controller is None
+    again, of = dia.stability().named("torque_filter")  # under the controller that was given, in which it is not
+    assert of == 6 and again >= 4
 
 
 @pytest.mark.long
