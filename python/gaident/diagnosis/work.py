@@ -291,7 +291,7 @@ class Work:
             self.notes += [or_other_gains(effect)] * (effect in self.gain_doubt.rivals)
             ends = ends_of(self.found.space, self.final, effect, [r.effect for r in rivals])
             known = estimates[effect], self.data.velocity
-            said_by, sides = evidence_of(effect, gain, alternatives, offset, ends, known), ends.sides
+            said_by, sides = evidence_of(effect, gain, alternatives, offset, ends, known, driver is not None), ends.sides
             what = name_of(effect), estimates[effect], alternatives, gains.of(effect), gain, None, said_by, False
             findings.append(Finding(*what, LIBRARY[effect].place, sides))
         if (impossible := of_no_axis(mechanics)) is not None:

@@ -41,9 +41,13 @@ NOT_AS_GIVEN = {
 _ANGULAR = ("frequency", "zero_frequency", "bandwidth")  # where they are in rad/s: they are read in Hz
 
 
-def certainty(bic: float) -> str:
-    """What a difference of so many BIC units means: 2 ln of the odds."""
-    return next(words for least, words in ((50.0, "beyond doubt"), (20.0, "very likely"), (-math.inf, "likely")) if bic >= least)
+def certainty(bic: float, doubted: bool = False) -> str:
+    """What a difference of so many BIC units means: 2 ln of the odds.
+
+    doubted: whether the model leaves more than noise, or ends at a bound: odds are of models one of which is right.
+    """
+    words = ((math.inf if doubted else 50.0, "beyond doubt"), (20.0, "very likely"), (-math.inf, "likely"))
+    return next(word for least, word in words if bic >= least)
 
 
 def structure_words(p: int, q: int) -> str:

@@ -42,6 +42,16 @@ def test_a_decay_for_each_limited_sample() -> None:
     assert all(f.place == "controller" for f in driver.findings)
 
 
+def test_a_decay_is_told_from_an_integral_that_is_held() -> None:
+    """It differs by a hundredth in each limited sample: the torques follow from both within what the log lost."""
+    limit = float(np.abs(log("decay").torque).max())
+    held = replace(GIVEN, velocity=replace(GIVEN.velocity, rule="forward", torque_limit=limit, anti_windup="hold"))
+    shown = scheme_shown([log("decay")], held)
+    assert shown is not None and shown.closer and abs(shown.scheme.number - DECAY) < 4.0 * shown.std
+    limit = float(np.abs(log("hold").torque).max())
+    assert scheme_shown([log("hold")], replace(held, velocity=replace(held.velocity, torque_limit=limit))) is None
+
+
 def test_a_clamp_of_integral_and_output_alike() -> None:
     found = loop_of([log("clamps")], GIVEN)
     assert {f.effect for f in found.findings} == {"torque_saturation", "integrator_clamp"}

@@ -394,6 +394,15 @@ def test_figures_of_chance_are_given_as_what_they_are() -> None:
     assert evidence_of("backlash", 412.0, ()).endswith(": beyond doubt (the model without it is 412 BIC units worse).")
 
 
+def test_no_cause_is_beyond_doubt_where_something_is_left_or_a_parameter_ends_at_its_bound() -> None:
+    words = ": very likely (the model without it is 412 BIC units worse)."
+    assert evidence_of("backlash", 412.0, (), left=True).endswith(words)
+    velocity = np.zeros(3)
+    for at_bound, said in ((True, words), (False, words.replace("very likely", "beyond doubt"))):
+        known = {"gap": ga.Estimate(0.1, 0.01, "rad", at_bound=at_bound)}, velocity
+        assert evidence_of("backlash", 412.0, (), known=known).endswith(said)
+
+
 def test_a_pair_that_does_not_swing_is_no_resonance() -> None:
     result = fake()
     result.mechanics = {name: result.mechanics[name] for name in ("inertia", "viscous_friction")}

@@ -289,6 +289,9 @@ def matrices(plant: Plant, period: float) -> tuple[Array, Array]:
     return whole[:n, :n], whole[:n, n]
 
 
+KEPT = {"decay": DECAY, "hold": 1.0}  # scheme -> what is kept of the integral in a limited sample
+
+
 def scheme_run(plant: Plant, command: Array, scheme: str, size: float, noise: Array | None = None) -> tuple[Array, Array]:
     """(velocity that the controller reads [rad/s], torque [N m]) at the controller's samples.
 
@@ -298,7 +301,7 @@ def scheme_run(plant: Plant, command: Array, scheme: str, size: float, noise: Ar
     F, G = matrices(plant, period)
     kp, ki = plant.kp, plant.ki
     x, integral, before, asked = np.zeros(len(G)), 0.0, 0.0, 0.0
-    limit = size if scheme in ("decay", "clamps") else np.inf
+    limit = size if scheme in (*KEPT, "clamps") else np.inf
     velocity, torque = np.empty(len(command)), np.empty(len(command))
     for n, r in enumerate(command):
         w = x[0] + (0.0 if noise is None else noise[n])
@@ -307,14 +310,14 @@ def scheme_run(plant: Plant, command: Array, scheme: str, size: float, noise: Ar
             e = 0.0
         if scheme == "reset" and r * asked < 0.0:
             integral = 0.0
-        if scheme != "decay":
+        if scheme not in KEPT:
             integral += 0.5 * ki * period * (e + before)
         if scheme == "clamps":
             integral = min(max(integral, -limit), limit)
         u = kp * e + integral
         limited = min(max(u, -limit), limit)
-        if scheme == "decay":
-            integral = DECAY * integral if limited != u else integral + ki * period * e
+        if scheme in KEPT:
+            integral = KEPT[scheme] * integral if limited != u else integral + ki * period * e
         velocity[n], torque[n] = w, limited
         before, asked = e, r if r else asked
         x = F @ x + G * limited
@@ -327,7 +330,7 @@ def scheme_log(plant: Plant, command: Array, scheme: str, seed: int) -> ga.Recor
     period = plant.dt / plant.log_every
     noise = rng.standard_normal(len(command)) * (0.1 if seed % 2 else COARSE / np.sqrt(6.0) / period)
     free = np.abs(scheme_run(plant, command, "", np.inf)[1]).max()
-    size = SCHEME_LIMIT * free if scheme in ("decay", "clamps") else BAND * float(np.abs(command).max())
+    size = SCHEME_LIMIT * free if scheme in (*KEPT, "clamps") else BAND * float(np.abs(command).max())
     velocity, torque = scheme_run(plant, command, scheme, size, noise)
     every = plant.log_every
     return ga.Record(plant.dt, command=command[::every], velocity=velocity[::every], torque=torque[::every], name=scheme)

@@ -205,9 +205,14 @@ def driving_of(
                 records, validation, origin = _again(records, validation, origin, partial(driven_by, controller=controller))
                 moved = aligned(records, validation, None, True)
     slower = controller is not None and pi is None and driven.slower and not limited
+    here, there = ([origin.get(r.digest, r) for r in part] for part in (records, validation))
+    if slower and (not doubts if form is None else form.simulated):
+        assert controller is not None
+        shown = (controller, findings, ()) if form is None else (form.controller, form.findings, form.notes)
+        law = other_scheme(here, there, *shown[:2])
+        form = form if law is None else replace(law, notes=(*shown[2], *law.notes))
     if slower and form is None and not asked.findings:
         assert controller is not None
-        here, there = ([origin.get(r.digest, r) for r in part] for part in (records, validation))
         if (lagging := behind_a_lag(here, there, controller)) is not None:
             form = replace(lagging, findings=(*findings, *lagging.findings), estimates=numbers)
     if form is not None:

@@ -103,6 +103,11 @@ def other_scheme(
         "The logged {torque} does not follow from the given controller (rms {:.2g} {N m}), but where {} (to {:.2g} {N m} rms). "
         "No model of the plant is involved."
     )
+    if shown.closer:
+        text = (
+            "The logged {torque} follows from an integral that is held at the {torque} limit (rms {:.2g} {N m}), and more closely "
+            "where {} (to {:.2g} {N m} rms). No model of the plant is involved."
+        )
     evidence = say(text, shown.before, law, shown.left)
     gain = gained(shown.samples * shown.before**2, shown.samples * shown.left**2, shown.samples, 1)
     numbers = {parameter: Estimate(scheme.number, shown.std, unit)} if parameter else {}

@@ -49,10 +49,12 @@ def evidence_of(
     offset: Offset | None = None,
     ends: Ends = NO_ENDS,
     known: tuple[Mapping[str, Estimate], NDArray[np.float64]] | None = None,
+    left: bool = False,
 ) -> Text:
     """What speaks for a finding: what it does, where, how sure that is, what these data cannot tell from it.
 
     known: its parameters and the velocity of the records [rad/s], of which a drag's torque is said.
+    left: whether something significant is left by the model that has it.
     """
     from gaident.show.wording import certainty
 
@@ -60,7 +62,8 @@ def evidence_of(
     if ends.apart:
         what = say("{}, {}", what, end_words(ends.sides))
     there = f", with it {end_words((ends.other,))} {ends.worse:.0f}" if ends.worse > 0.0 else ""
-    sure, worse = certainty(gain), f"(the model without it is {gain:.0f} BIC units worse{there})"
+    at_bound = known is not None and any(e.at_bound for e in known[0].values())
+    sure, worse = certainty(gain, left or at_bound), f"(the model without it is {gain:.0f} BIC units worse{there})"
     if alternatives:
         others = joined(" or ", map(called, alternatives))
         return say("{}, or {}: one of these is there, {} {}; these data do not say which.", what, others, sure, worse)

@@ -128,7 +128,7 @@ class SchemeShown:
     """A law from which the logged torques follow, beside these gains, rule and limit.
 
     std: of its number. samples: lines that were compared. before, left: rms of logged minus made torque [N m], of the given
-    controller, or with what a `PI` has at that limit, and with the law.
+    controller, or with what a `PI` has at that limit, and with the law. closer: whether the torques follow from that, too.
     """
 
     scheme: Scheme
@@ -137,6 +137,7 @@ class SchemeShown:
     before: float
     left: float
     samples: int
+    closer: bool = False
 
     def made(self, rec: Record) -> Vector:
         """The torque at the controller's samples [N m] (n r,)."""
@@ -147,15 +148,16 @@ def scheme_shown(records: Sequence[Record], controller: Cascade) -> SchemeShown 
     """The law beside a velocity controller without filters and feedforward that makes the torques of a slower log; or None.
 
     What `PI` has is not looked for: its integral is not held or tracked, and has no clamp of its own.
+    Of a controller that holds its integral, and from which the torques follow, a decay is told that comes closer: it differs by
+    little in each limited sample, and what a slow log lost hides that.
     """
     pi = replace(controller.velocity.winding_up, integrator_limit=None)
     bare = Cascade(pi, controller.period, delay=controller.delay)
     plain = replace(controller, velocity=replace(pi, torque_limit=controller.velocity.torque_limit)) == bare
-    if (
-        not plain
-        or not not_followed(records, controller)
-        or any(r.torque_log == MEAN or not comparable(r, bare) for r in records)
-    ):
+    if not plain or any(r.torque_log == MEAN or not comparable(r, bare) for r in records):
+        return None
+    closer = not not_followed(records, controller)
+    if closer and controller.velocity.anti_windup != "hold":
         return None
     if pi.torque_limit is None:
         plateau = plateau_of(np.concatenate([np.abs(r.torque) for r in records if r.torque is not None]))
@@ -165,7 +167,7 @@ def scheme_shown(records: Sequence[Record], controller: Cascade) -> SchemeShown 
     at_limit = [] if pi.torque_limit is None else [replace(pi, anti_windup="hold")]
     known = [controller, bare, *(replace(bare, velocity=one) for one in at_limit)]
     before = min(_rms([log.torque - log.made(one) for log in logs]) for one in known)
-    found = min((_fitted(logs, kind, variant, bare) for kind, variant in _kinds(pi)), key=lambda one: one[0], default=None)
+    found = min((_fitted(logs, kind, variant, bare) for kind, variant in _kinds(pi, closer)), key=lambda one: one[0], default=None)
     if found is None:
         return None
     left, scheme = found
@@ -176,19 +178,19 @@ def scheme_shown(records: Sequence[Record], controller: Cascade) -> SchemeShown 
             (left, scheme), bare = again, other
     scheme, std = _number(logs, scheme, bare)
     left = _rms(_left(logs, scheme, bare))
-    follows = all(
+    follows = closer or all(
         off_by(rec, log, bare, lambda one, straight: _made(scheme, bare, one, straight)[:: _every(one)]) == 0.0
         for rec, log in zip(records, logs, strict=True)
     )
-    if not follows or not left < POLICY.each_number * before:
+    if not follows or not left < POLICY.each_number * before or (closer and not 1.0 - scheme.number > POLICY.check_deviations * std):
         return None
-    return SchemeShown(scheme, bare, std, before, left, sum(len(log.torque) for log in logs))
+    return SchemeShown(scheme, bare, std, before, left, sum(len(log.torque) for log in logs), closer)
 
 
-def _kinds(pi: PI) -> Iterator[tuple[str, str]]:
-    """What may be: an integral decays at a limit only."""
+def _kinds(pi: PI, decays: bool) -> Iterator[tuple[str, str]]:
+    """What may be: an integral decays at a limit only; decays: nothing else is asked for."""
     for kind, variants in VARIANTS.items():
-        if kind != DECAY or pi.torque_limit is not None:
+        if (kind == DECAY and pi.torque_limit is not None) or (kind != DECAY and not decays):
             yield from ((kind, variant) for variant in variants)
 
 
