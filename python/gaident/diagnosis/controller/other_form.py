@@ -105,8 +105,8 @@ def other_scheme(
     )
     if shown.closer:
         text = (
-            "The logged {torque} follows from an integral that is held at the {torque} limit (rms {:.2g} {N m}), and more closely "
-            "where {} (to {:.2g} {N m} rms). No model of the plant is involved."
+            "The logged {torque} follows from an integral that is held at the {torque} limit (rms {:.2g} {N m}), and closer where "
+            "{} (to {:.2g} {N m} rms). No model of the plant is involved."
         )
     evidence = say(text, shown.before, law, shown.left)
     gain = gained(shown.samples * shown.before**2, shown.samples * shown.left**2, shown.samples, 1)

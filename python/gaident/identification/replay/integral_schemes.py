@@ -167,7 +167,8 @@ def scheme_shown(records: Sequence[Record], controller: Cascade) -> SchemeShown 
     at_limit = [] if pi.torque_limit is None else [replace(pi, anti_windup="hold")]
     known = [controller, bare, *(replace(bare, velocity=one) for one in at_limit)]
     before = min(_rms([log.torque - log.made(one) for log in logs]) for one in known)
-    found = min((_fitted(logs, kind, variant, bare) for kind, variant in _kinds(pi, closer)), key=lambda one: one[0], default=None)
+    kinds = _kinds(pi, closer)
+    found = min((_fitted(logs, kind, variant, bare) for kind, variant in kinds), key=lambda one: one[0], default=None)
     if found is None:
         return None
     left, scheme = found
@@ -182,7 +183,8 @@ def scheme_shown(records: Sequence[Record], controller: Cascade) -> SchemeShown 
         off_by(rec, log, bare, lambda one, straight: _made(scheme, bare, one, straight)[:: _every(one)]) == 0.0
         for rec, log in zip(records, logs, strict=True)
     )
-    if not follows or not left < POLICY.each_number * before or (closer and not 1.0 - scheme.number > POLICY.check_deviations * std):
+    decays = not closer or 1.0 - scheme.number > POLICY.check_deviations * std
+    if not (follows and decays and left < POLICY.each_number * before):
         return None
     return SchemeShown(scheme, bare, std, before, left, sum(len(log.torque) for log in logs), closer)
 
