@@ -105,7 +105,7 @@ def other_scheme(
     )
     if shown.closer:
         text = (
-            "The logged {torque} follows from an integral that is held at the {torque} limit (rms {:.2g} {N m}), and closer where "
+            "The logged {torque} follows from an integral that is held at the limit (rms {:.2g} {N m}), and closer where "
             "{} (to {:.2g} {N m} rms). No model of the plant is involved."
         )
     evidence = say(text, shown.before, law, shown.left)
