@@ -124,7 +124,7 @@ CALLS: dict[str, tuple[Callable[..., Any], dict[str, Any]]] = {
     "idn.summary": (IDN.summary, {}),
     "dia.summary": (DIA.summary, {}),
     "load": (ga.load, {"path": "saved.json"}),
-    "report": (ga.report, {"result": DIA, "path": "page.html"}),
+    "report": (ga.report, {"result": DIA, "path": "page.html", "remedies": False}),
     "to_fmu": (ga.to_fmu, {"model": ONE, "path": "drive.fmu", "dt": 1e-3, "controller": PI, "binary": False}),
     "to_fmu compiled": (ga.to_fmu, {"model": ONE, "path": "drive.fmu", "dt": 1e-3, "compiler": "gcc"}),
     "to_control": (ONE.to_control, {}),
@@ -265,7 +265,7 @@ def test_a_wrong_argument_is_one_error_that_is_ours(name: str, here: Path) -> No
         for value in HOSTILE:
             if callable(value) and (name, argument) in TAKEN:
                 continue
-            began = time.perf_counter()
+            began = time.process_time()
             try:
                 with warnings.catch_warnings():
                     warnings.simplefilter("error")
@@ -275,8 +275,8 @@ def test_a_wrong_argument_is_one_error_that_is_ours(name: str, here: Path) -> No
                     wrong.append(f"{argument}={value!r:.40}: more than one line: {error!r:.200}")
             except Exception as error:
                 wrong.append(f"{argument}={value!r:.40}: {error!r:.200}")
-            if time.perf_counter() - began > 10.0:
-                wrong.append(f"{argument}={value!r:.40}: {time.perf_counter() - began:.1f} s")
+            if time.process_time() - began > 10.0:
+                wrong.append(f"{argument}={value!r:.40}: {time.process_time() - began:.1f} s")
     for own in tuple(OWN):
         ga.effects.unregister(own)
     assert not wrong, "\n".join(wrong)
