@@ -98,6 +98,10 @@ struct Drive {  // SI units, rad; neutral values
     double resolver = 0;     // error of the angle sensor that grows with speed, rad s/rad,
     double resolver_order = 1;
     double resolver_phase = 0;
+    double stop = 0;        // a hard stop of the motor's angle, N m/rad,
+    double stop_angle = 0;  // reached from 0
+    double stop_damping = 0;
+    double growing = 0;  // the load's inertia, with one mass all of it, is J (1 + growing t), 1/s
     // end of fields
 };
 
@@ -165,6 +169,10 @@ struct End {
         if (d.dahl != 0) q -= d.dahl_stiffness * x[bristle];
         if (d.lugre != 0) q -= d.lugre_stiffness * x[bent] + d.lugre_damping * bending(x);
         if (!load) q -= d.ground * (x[angle] - d.rest);
+        if (!load && d.stop != 0) {  // it pushes, and never pulls
+            const double out = sign(d.stop_angle), into = out * (x[angle] - d.stop_angle);
+            if (into > 0) q -= out * std::max(d.stop * into + d.stop_damping * out * x[speed], 0.0);
+        }
         if (d.unbalance != 0) q -= d.unbalance * std::sin(turned(x) + d.unbalance_phase);
         if (d.cogging != 0) q -= d.cogging * std::sin(d.cogging_order * turned(x) + d.cogging_phase);
         if (d.hum != 0) q += d.hum * std::sin(6.283185307179586477 * d.hum_frequency * t + d.hum_phase);
@@ -263,14 +271,14 @@ private:
         }
         // J(theta) = J (1 + a cos(psi)), and the torque -J'(theta) w^2/2
         const double theta = d.J2 > 0 ? x[angle] - x[twist] : x[angle], psi = d.turning_order * theta + d.turning_phase;
-        const double share = 1 + d.turning * std::cos(psi), bend = 0.5 * d.turning * d.turning_order * std::sin(psi);
+        const double share = (1 + d.turning * std::cos(psi)) * (1 + d.growing * t), bend = 0.5 * d.turning * d.turning_order * std::sin(psi);
         const double J1 = d.J2 > 0 ? d.J1 : d.J1 * share, J2 = d.J2 * share;
-        const double outward = d.J2 > 0 ? 0 : d.J1 * bend * x[w1] * x[w1];
+        const double outward = d.J2 > 0 ? 0 : d.J1 * (bend * x[w1] - d.growing) * x[w1];  // d(J w)/dt = J dw/dt + J' w
         dx[w1] = resting ? 0 : (g * net + stored(x) - d.D1 * x[w1] - tc + outward) / J1;
         dx[angle] = x[w1];
         if (d.J2 > 0) {
             const double own = smooth(1, x, t) - (ends[1].dry ? way[1] * ends[1].level(x, t, way[1]) : 0);
-            dx[w2] = ends[1].dry && way[1] == 0 ? 0 : (tc - d.D2 * x[w2] + own + d.J2 * bend * x[w2] * x[w2]) / J2;
+            dx[w2] = ends[1].dry && way[1] == 0 ? 0 : (tc - d.D2 * x[w2] + own + d.J2 * (bend * x[w2] - d.growing) * x[w2]) / J2;
             dx[twist] = x[w1] - x[w2];
             if (d.hysteretic != 0) {
                 const double rate = dx[twist], yielded = d.hysteretic * x[hysteresis] / d.hysteretic_torque;

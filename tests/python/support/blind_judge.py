@@ -27,6 +27,8 @@ DRIVERS = {
     "random_walk_friction": ("time",),
     "thermal_gain": ("time", "torque"),
     "resolver_error_of_speed": ("position", "velocity"),
+    "contact": ("position",),
+    "growing_inertia": ("time", "torque"),
 }
 PARTS = {"random_walk_friction": ("coulomb_friction",)}
 ANGLES = ("phase",)

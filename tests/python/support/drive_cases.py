@@ -323,6 +323,9 @@ def draw_effect(name: str, factor: float, plant: Plant, samples: int, rng: np.ra
         "hysteretic_coupling": {"torque": 0.04 * factor, "stiffness": 0.4 * factor * plant.KG},
         "random_walk_friction": {"torque": 0.05 * factor, "size": 0.6, "number": float(round(1e8 * phase))},
         "thermal_gain": {"share": min(0.6, 0.25 * factor), "time_constant": 0.5 * samples * plant.dt},
+        # The angle is a share of the way that the axis makes, see `as_the_way_is`.
+        "contact": {"stiffness": 200 * near, "angle": 0.8, "damping": 0.05 * near},
+        "growing_inertia": {"rate": 0.5 * factor / (samples * plant.dt)},
         "resolver_error_of_speed": {"error": 1.5e-4 * factor, "order": float(2 ** (round(1e8 * phase) % 3)), "phase": phase},
     }
     return drawn[name]
@@ -333,6 +336,13 @@ def as_ramps_ask(hidden: dict[str, dict[str, float]], plant: Plant, command: Arr
     if "torque_saturation" in hidden:
         asked = float(np.abs(run_drive(plant, command).torque).max())
         hidden["torque_saturation"]["limit"] *= asked / (3.7 * max(1.0, plant.kp / 0.0232))
+
+
+def as_the_way_is(hidden: dict[str, dict[str, float]], plant: Plant, command: Array) -> None:
+    """Put a stop at that share of the largest angle of the axis without it."""
+    if "contact" in hidden:
+        angle = run_drive(plant, command).position
+        hidden["contact"]["angle"] *= float(angle[np.abs(angle).argmax()])
 
 
 def stable(plant: Plant, effects: dict[str, dict[str, float]]) -> bool:
@@ -414,6 +424,7 @@ def random_truth(
         commands = [command_for(kind, now, rng, other_order) for other_order in (False, True)]
         if kind in ANYWHERE:
             as_ramps_ask(hidden, now, commands[0])
+        as_the_way_is(hidden, now, commands[0])
         truth = Truth(
             effects=hidden, plant=now, kind=kind, noise=noise_now, factor=factor or (factors[0] if factors else 0.0), seed=seed,
             command=commands[0], validation_command=None if kind == "step" else commands[1], settle=settle,

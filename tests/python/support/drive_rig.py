@@ -133,6 +133,8 @@ FIELDS: dict[str, dict[str, str]] = {
     "random_walk_friction": {"torque": "walking", "size": "walk_size", "number": "walk_number"},
     "thermal_gain": {"share": "gain_lost", "time_constant": "warming"},
     "resolver_error_of_speed": {"error": "resolver", "order": "resolver_order", "phase": "resolver_phase"},
+    "contact": {"stiffness": "stop", "angle": "stop_angle", "damping": "stop_damping"},
+    "growing_inertia": {"rate": "growing"},
 }
 FRICTION: dict[str, dict[str, str]] = {
     "coulomb_friction": {"torque": "both"},
@@ -158,7 +160,7 @@ SHAFT = (
     "square_root_drag",
     "position_friction",
 )
-OUTSIDE = ("random_walk_friction", "thermal_gain", "resolver_error_of_speed")
+OUTSIDE = ("random_walk_friction", "thermal_gain", "resolver_error_of_speed", "contact", "growing_inertia")
 COUPLING = ("backlash", "hardening_stiffness", "hysteretic_coupling")
 
 
