@@ -113,9 +113,13 @@ def test_on_a_single_step_no_wrong_name(members: tuple[str, ...]) -> None:
         assert not judged.wrong, judged
 
 
-# Outside the library and named nevertheless: a known miss.
+# Outside the library and named nevertheless, or with another driver: known misses.
 WALKS = "this walk has a trend that is called a drift of friction; what is left is said to depend on the time"
-MISSES = {"random_walk_friction": pytest.mark.xfail(reason=WALKS, strict=True)}
+STANDS = "an axis that presses against a stop stands there for a while: what is left is said to depend on the time"
+MISSES = {
+    "random_walk_friction": pytest.mark.xfail(reason=WALKS, strict=True),
+    "contact": pytest.mark.xfail(reason=STANDS, strict=True),
+}
 
 
 @pytest.mark.long
