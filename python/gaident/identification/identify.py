@@ -25,7 +25,7 @@ from gaident.identification.arguments import check_arithmetic, check_numbers, ch
 from gaident.identification.closed_loop import input_of, looped_over, space_of
 from gaident.identification.controller_numbers import with_estimates
 from gaident.identification.noise import Autoregression, autoregression_of, highest_order
-from gaident.identification.notes import record_notes, unseen_notes
+from gaident.identification.notes import inertia_of, record_notes, slower_than_the_loop, unseen_notes
 from gaident.identification.parts import search_parts
 from gaident.identification.replay.notes import replay_notes
 from gaident.identification.replay.timed_record import plain_of
@@ -188,6 +188,7 @@ def _of_records(
     result = runs.report(RecordSearch(records, digests, loop, space, settings, moving, runs.workers, responses))
     warnings = [*replay_notes(checked, controller), *numbers.notes, *looped.notes, *result.warnings]
     warnings += unseen_notes(result.mechanics, given[0].dt)
+    warnings += slower_than_the_loop(inertia_of(result.mechanics), controller, given[0].dt)
     if derived and not settings.species:
         warnings.append(
             "Search ranges derived from the data are wide; the plain engine needs narrow ones: give the search space."

@@ -17,7 +17,15 @@ from gaident.results.adequacy import Adequacy
 from gaident.results.estimate import Estimate
 from gaident.results.structures import Rival
 
-__all__ = ["open_loop_notes", "reading_notes", "record_notes", "unseen_notes", "warnings_of"]
+__all__ = [
+    "inertia_of",
+    "open_loop_notes",
+    "reading_notes",
+    "record_notes",
+    "slower_than_the_loop",
+    "unseen_notes",
+    "warnings_of",
+]
 
 
 def warnings_of(
@@ -64,6 +72,28 @@ def unseen_notes(mechanics: OneMass | TwoMass | None, dt: float) -> list[str]:
         f"A resonance above {highest:.2g} Hz does not show in a log with a line every {1e3 * dt:.3g} ms: the one of "
         f"{mechanics.resonance / math.tau:.3g} Hz stands for something else that is fast; none of its numbers is the shaft's."
     ]
+
+
+def inertia_of(mechanics: OneMass | TwoMass | None) -> float | None:
+    """The inertia of a whole axis [kg m^2]."""
+    return None if mechanics is None else mechanics.J if isinstance(mechanics, OneMass) else mechanics.JM + mechanics.JL
+
+
+def slower_than_the_loop(inertia: float | None, controller: Controller | None, dt: float) -> list[Text]:
+    """A sentence on a log whose lines, dt [s] apart, do not show how its velocity loop moves; inertia [kg m^2]: found.
+
+    Such a loop crosses over at w = kp/J [rad/s], above `seen_band` of pi/dt.
+    """
+    kp = None if controller is None else controller.gains.kp
+    if not inertia or not kp or not kp > POLICY.seen_band * (math.pi / dt) * abs(inertia):
+        return []
+    ms = 1e3  # no decision: a unit: in a second
+    text = (
+        "The velocity loop settles in {:.2g} ms ({inertia} over kp), and the log has a line every {:.3g} ms: how the axis moves "
+        "between two speeds is not in it. {Inertia}, stiffness and times rest on what the controller is said to be. What such a "
+        "log does show is the {torque} at held speeds: `gaident.friction_map`. Log every sample to see the rest."
+    )
+    return [say(text, ms * abs(inertia) / kp, ms * dt)]
 
 
 def _shaft_notes(mechanics: OneMass | TwoMass) -> list[str]:

@@ -15,7 +15,7 @@ from clock import fastest
 from gaident.axis import said
 from gaident.errors import RecordError, SpaceError
 from gaident.identification.noise import chi2_tail
-from gaident.identification.notes import reading_notes, unseen_notes
+from gaident.identification.notes import inertia_of, reading_notes, slower_than_the_loop, unseen_notes
 
 DT = 0.444e-3
 ONE_MASS = ga.OneMass(J=2e-4, D=3e-3).model()
@@ -248,6 +248,18 @@ def test_a_resonance_above_what_the_log_shows_is_said_to_be_unseen() -> None:
     (note,) = unseen_notes(fast, 1e-3)
     assert "above 4e+02 Hz does not show" in note and "862 Hz stands for something else" in note
     assert unseen_notes(fast, 0.25e-3) == []
+
+
+def test_a_log_that_is_slower_than_the_velocity_loop_is_said_and_what_it_still_shows() -> None:
+    """kp/J = 500 rad/s: a line every 5 ms shows it just so, one every 20 ms does not."""
+    axis = ga.TwoMass(JM=4e-4, DM=1e-3, JL=6e-4, DL=1e-3, KG=400.0)
+    assert inertia_of(axis) == 1e-3 == inertia_of(ga.OneMass(J=1e-3, D=0.1)) and inertia_of(None) is None
+    servo = ga.Cascade(ga.PI(0.5, 20.0), 125e-6)
+    assert slower_than_the_loop(1e-3, servo, 5e-3) == [] == slower_than_the_loop(1e-3, None, 20e-3)
+    assert slower_than_the_loop(None, servo, 20e-3) == [] == slower_than_the_loop(1e-3, ga.PI(None, 20.0), 20e-3)
+    (note,) = slower_than_the_loop(inertia_of(axis), servo, 20e-3)
+    assert note.startswith("The velocity loop settles in 2 ms (inertia over kp), and the log has a line every 20 ms")
+    assert "the torque at held speeds: `gaident.friction_map`" in note
 
 
 def test_a_velocity_of_another_unit_than_its_position_is_said() -> None:

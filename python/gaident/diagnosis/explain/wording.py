@@ -15,6 +15,7 @@ from gaident.diagnosis.library.terms import LIBRARY
 from gaident.diagnosis.selection.offset import Offset
 from gaident.diagnosis.selection.select import Selection
 from gaident.estimation.dataset import DataSet
+from gaident.identification.notes import slower_than_the_loop
 from gaident.models.effect_rows import end_words
 from gaident.models.effects import row_of
 from gaident.policy.table import POLICY
@@ -110,8 +111,8 @@ def not_borne_out(named: Sequence[Finding], kept: Sequence[Finding]) -> Text:
     """Note on what the torque alone shows of the controller, and the model of the axis does not."""
     lost = [f.effect for f in named if f.effect not in {k.effect for k in kept}] or [f.effect for f in named]
     text = (
-        "From the logged {torque} alone a controller with another {} came closer, as what the log lost between its lines can "
-        "look like that: no model of the axis leaves noise under it, or as little; one does under the controller that is used."
+        "From the logged {torque} alone another controller came closer ({}), as what the log lost between its lines can look "
+        "like that: no model of the axis leaves noise under it, or as little; one does under the controller that is used."
     )
     return say(text, joined(" and ", map(called, lost)))
 
@@ -176,7 +177,9 @@ def of_the_mechanics(mechanics: Mapping[str, Estimate], ages: Mapping[str, float
     ages: name -> the part of its deviation that the age of the velocity makes; left_open: whether the controller was given with
     numbers that are not known.
     """
-    return _drives_itself(mechanics) + _swings_up(mechanics) + _of_the_controller(mechanics, ages, data, left_open)
+    inertia = mechanics.get("inertia")
+    slow = slower_than_the_loop(None if inertia is None else inertia.value, data.controller, data.dt)
+    return _drives_itself(mechanics) + _swings_up(mechanics) + slow + _of_the_controller(mechanics, ages, data, left_open)
 
 
 def torque_unlogged(data: DataSet) -> list[Text]:
