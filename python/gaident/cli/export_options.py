@@ -45,7 +45,7 @@ def add_export_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("-o", "--out", metavar="FILE", help="where to write (default: RESULT.c, .fmu, .py, ... here)")
     parser.add_argument("--dt", type=number, metavar="S", help="of C and FMU: sample time of the steps [s]")
     parser.add_argument(
-        "--closed", action="store_true", help="of C and FMU: with the controller of the result, command to velocity"
+        "--closed", action="store_true", help="of C and FMU: with the controller of the result, its command to velocity"
     )
     parser.add_argument("--linear", action="store_true", help="the linear part of the model alone")
     parser.add_argument("--sources", action="store_true", help="of an FMU: sources alone, no library for this machine")

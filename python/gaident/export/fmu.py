@@ -27,10 +27,12 @@ from xml.etree import ElementTree
 
 from gaident.arguments import arg
 from gaident.axis import checked_axis, said, say, unit
-from gaident.checks import checked_path, yes_or_no
-from gaident.control.pi import PI
+from gaident.checks import checked_path, time_of_sample, yes_or_no
+from gaident.control.controller import Controller, checked_controller
+from gaident.control.unknown import known
 from gaident.errors import ModelError
 from gaident.export.c_source import c_name, c_source
+from gaident.export.servo import Servo
 from gaident.files import write_whole
 from gaident.models.mechanics import OneMass, TwoMass
 from gaident.models.model import Model
@@ -60,7 +62,7 @@ def to_fmu(
     model: Model | OneMass | TwoMass,
     path: str | os.PathLike[str],
     dt: float,
-    controller: PI | None = None,
+    controller: Controller | None = None,
     *,
     substeps: int | None = None,
     axis: str = "rotary",
@@ -70,8 +72,9 @@ def to_fmu(
     """Write a model as an FMU of FMI 3.0 for co-simulation: for Simulink, Dymola, OpenModelica, FMPy and others.
 
     It is the C file of `Model.to_c`, all built-in effects included, and steps as `run` does.
-    Its input is `command` with a controller, `torque_command` without one; its outputs are `velocity`, `torque` and `position`.
-    A communication step is a whole multiple of dt, over which the input is held.
+    Its input is `command` with a controller, `position_command` with one that has a position controller, `torque_command` without
+    one; its outputs are `velocity`, `torque` and `position`.
+    A communication step is a whole multiple of dt, or of the controller's period where it has one, over which the input is held.
 
     Parameters
     ----------
@@ -80,9 +83,9 @@ def to_fmu(
     path : str or path-like
         File to write, with the ending .fmu.
     dt : float
-        Sample time of its steps [s].
-    controller : PI, optional
-        The velocity loop; None: the drive alone, torque [N m] to velocity [rad/s].
+        Sample time of its steps [s]; it steps at the controller's period where that is shorter.
+    controller : PI or Cascade, optional
+        The loop; None: the drive alone, torque [N m] to velocity [rad/s].
     substeps : int, optional
         As `Model.to_c` takes it.
     axis : {"rotary", "linear"}
@@ -100,7 +103,10 @@ def to_fmu(
     Raises
     ------
     ModelError
-        For what `Model.to_c` refuses, and where no compiler is found or it fails.
+        For what `Model.to_c` refuses, for a feedforward with slopes over the coming period, which no input tells, and where no
+        compiler is found or it fails.
+    ControllerError
+        As `Model.to_c`.
     OSError
         Where the file cannot be written.
 
@@ -120,15 +126,16 @@ def to_fmu(
         raise ModelError(f"compiler is {compiler!r:.80}: give a C compiler as on a command line, such as 'gcc', or None")
     checked_axis(axis)
     plant, name = as_model(model), c_name(target.stem)
+    step = _step(dt, controller)
     sources = {
-        f"{name}.c": c_source(plant, dt, controller, name, substeps, axis),
+        f"{name}.c": c_source(plant, step, controller, name, substeps, axis),
         "fmi3.c": files("gaident.export").joinpath("fmi3.c").read_text(encoding="utf-8"),
     }
     token = hashlib.sha256("".join(sources.values()).encode()).hexdigest()
-    sources["fmu.c"] = _between(name, float(dt), token, "    double angle;" in sources[f"{name}.c"])
+    sources["fmu.c"] = _between(name, step, token, "    double angle;" in sources[f"{name}.c"])
     contents = {f"sources/{file}": text.encode() for file, text in sources.items()}
     contents["sources/buildDescription.xml"] = _build(name)
-    contents["modelDescription.xml"] = _description(name, float(dt), token, controller is not None, axis)
+    contents["modelDescription.xml"] = _description(name, (step, float(dt)), token, controller, axis)
     if binary:
         folder, suffix = _platform()
         contents[f"binaries/{folder}/{name}{suffix}"] = _compiled(sources, name + suffix, compiler)
@@ -138,6 +145,24 @@ def to_fmu(
             archive.writestr(zipfile.ZipInfo(file, DATE), data, zipfile.ZIP_DEFLATED)
     write_whole(target, packed.getvalue())
     return target
+
+
+def _step(dt: float, controller: Controller | None) -> float:
+    """Its step [s]: a sample of the controller. Raises ModelError where the controller reads commands that come later."""
+    time_of_sample(dt, ModelError)
+    given = checked_controller(controller)
+    if given is None:
+        return float(dt)
+    known(given)
+    servo = Servo.of(given, dt)
+    if servo is None:
+        return float(dt)
+    if servo.ahead:
+        raise ModelError(
+            'feedforward_over is "coming": the feedforward takes slopes of commands that come later, which no input of an FMU '
+            'tells; give Cascade(..., feedforward_over="past"), or write C with to_c, whose steps read the coming commands'
+        )
+    return servo.period
 
 
 def _between(name: str, dt: float, token: str, angle: bool) -> str:
@@ -204,7 +229,8 @@ def _build(name: str) -> bytes:
     return _xml(root)
 
 
-def _description(name: str, dt: float, token: str, closed: bool, axis: str) -> bytes:
+def _description(name: str, steps: tuple[float, float], token: str, controller: Controller | None, axis: str) -> bytes:
+    """steps: its own, and that at which a tool may communicate with it [s]."""
     root = ElementTree.Element(
         "fmiModelDescription",
         fmiVersion="3.0",
@@ -214,17 +240,20 @@ def _description(name: str, dt: float, token: str, closed: bool, axis: str) -> b
         variableNamingConvention="flat",
     )
     abilities = dict.fromkeys(("canGetAndSetFMUState", "canSerializeFMUState"), "true")
-    ElementTree.SubElement(root, "CoSimulation", {"modelIdentifier": name, "fixedInternalStepSize": repr(dt), **abilities})
+    ElementTree.SubElement(root, "CoSimulation", {"modelIdentifier": name, "fixedInternalStepSize": repr(steps[0]), **abilities})
     units = ElementTree.SubElement(root, "UnitDefinitions")
     speed, torque, place = (unit(u, axis) for u in ("rad/s", "N m", "rad"))
     for one in (speed, torque, place):
         base = {k: str(v) for k, v in BASE[one].items()}
         ElementTree.SubElement(ElementTree.SubElement(units, "Unit", name=one), "BaseUnit", base)
-    ElementTree.SubElement(root, "DefaultExperiment", startTime="0", stepSize=repr(dt))
+    ElementTree.SubElement(root, "DefaultExperiment", startTime="0", stepSize=repr(steps[1]))
     variables = ElementTree.SubElement(root, "ModelVariables")
     clock = {"name": "time", "valueReference": "0", "causality": "independent", "variability": "continuous"}
     ElementTree.SubElement(variables, "Float64", clock)
-    given = ("command", speed, "velocity command") if closed else ("torque_command", torque, "{torque} of the motor")
+    given = ("torque_command", torque, "{torque} of the motor")
+    if controller is not None:
+        placed = controller.driven_by == "position_command"
+        given = (controller.driven_by, place if placed else speed, "position command" if placed else "velocity command")
     rows = [
         (*given, "input"),
         ("velocity", speed, "velocity of the motor as the sensor shows it", "output"),

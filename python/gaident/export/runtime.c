@@ -387,22 +387,25 @@ static double gaident_linear_step(const gaident_drive *k, gaident_memory *s, dou
     return y;
 }
 
-/* A drive with effects: velocity read, torque issued, then the substeps. `issued`: torques on their way. */
-static double gaident_effects_step(const gaident_drive *k, gaident_memory *s, double *issued, double input, double *torque) {
-    double y = gaident_shown(k, s), u = input;
+/* What a controller reads. */
+static double gaident_reading(const gaident_drive *k, const gaident_memory *s) {
+    const double y = gaident_shown(k, s), step = k->velocity_quantisation.step;
+    return k->effects & GAIDENT_VELOCITY_QUANTISATION ? nearbyint(y / step) * step : y;
+}
+
+/* The velocity command as the effects let it pass. */
+static double gaident_followed(const gaident_drive *k, gaident_memory *s, double r) {
+    if (!(k->effects & GAIDENT_COMMAND_RATE_LIMIT)) return r;
+    return s->command_rate_limit.before += gaident_clip(r - s->command_rate_limit.before, k->command_rate_limit.step);
+}
+
+static double gaident_integrator_limit(const gaident_drive *k) {
+    return k->effects & GAIDENT_INTEGRATOR_CLAMP ? fmin(k->integrator_limit, k->integrator_clamp.limit) : k->integrator_limit;
+}
+
+/* The torque u is issued, then come the substeps of the sample. `issued`: torques on their way. */
+static void gaident_act(const gaident_drive *k, gaident_memory *s, double *issued, double u) {
     int j;
-    if (k->effects & GAIDENT_VELOCITY_QUANTISATION) y = nearbyint(y / k->velocity_quantisation.step) * k->velocity_quantisation.step;
-    if (k->closed) {
-        double r = input, e, I, limit = k->integrator_limit;
-        if (k->effects & GAIDENT_COMMAND_RATE_LIMIT)
-            r = s->command_rate_limit.before += gaident_clip(r - s->command_rate_limit.before, k->command_rate_limit.step);
-        if (k->effects & GAIDENT_INTEGRATOR_CLAMP) limit = fmin(limit, k->integrator_clamp.limit);
-        e = r - y;
-        I = gaident_clip(fma(k->g, e, s->stored), limit);
-        s->stored = fma(k->g, e, I);
-        u = gaident_clip(fma(k->kp, e, I), k->torque_limit);
-    }
-    *torque = u;
     if (k->effects & GAIDENT_TORQUE_SATURATION) u = gaident_clip(u, k->torque_saturation.limit);
     if (k->effects & GAIDENT_TORQUE_DEAD_BAND) u -= gaident_clip(u, k->torque_dead_band.width);
     if (k->effects & GAIDENT_TRANSPORT_DELAY) {
@@ -458,12 +461,113 @@ static double gaident_effects_step(const gaident_drive *k, gaident_memory *s, do
         }
         if (k->effects & GAIDENT_VELOCITY_FILTER) gaident_filter(k, s, y_next, bend);
     }
+}
+
+/* A drive with effects: velocity read, torque issued, then the substeps. */
+static double gaident_effects_step(const gaident_drive *k, gaident_memory *s, double *issued, double input, double *torque) {
+    const double y = gaident_reading(k, s);
+    double u = input;
+    if (k->closed) {
+        const double e = gaident_followed(k, s, input) - y;
+        const double I = gaident_clip(fma(k->g, e, s->stored), gaident_integrator_limit(k));
+        s->stored = fma(k->g, e, I);
+        u = gaident_clip(fma(k->kp, e, I), k->torque_limit);
+    }
+    *torque = u;
+    gaident_act(k, s, issued, u);
     return y;
 }
 
-static double gaident_step(const gaident_drive *k, gaident_memory *s, double *issued, double input, double *torque) {
-    if (k->substeps > 0) return gaident_effects_step(k, s, issued, input, torque);
-    return gaident_linear_step(k, s, input, torque);
+/* -- the controller of a servo axis, at its own clock --------------------------------------------------------------------- */
+
+static double gaident_filtered(const gaident_filters *c, gaident_filters_memory *m, double u) {
+    int i;
+    for (i = 0; i < c->count; ++i) {
+        const double y = fma(c->filter[i].b0, u, m->x1[i]);
+        m->x1[i] = fma(-c->filter[i].a1, y, fma(c->filter[i].b1, u, m->x2[i]));
+        m->x2[i] = fma(-c->filter[i].a2, y, c->filter[i].b2 * u);
+        u = y;
+    }
+    return u;
+}
+
+/* v*, the velocity command or the slope of the position command, and what is fed forward of the torque: of v* and of its slope.
+   The slopes are those over the coming period, so that input[position_every], ... are read; or those over the past one, before
+   whose first the command stood still. */
+static double gaident_feedforward(const gaident_servo *c, gaident_servo_memory *m, const double *input) {
+    const int n = c->position_every, placed = c->position_gain != 0.0;
+    const double period = c->slope_time;
+    double v, slope = 0.0, pushed, rubbed;
+    if (!c->feeds) return 0.0;
+    if (c->past) {
+        v = !placed ? input[0] : m->begun ? (input[0] - m->command_before) / period : 0.0;
+        slope = m->begun ? (v - m->velocity_before) / period : 0.0;
+        m->begun = 1;
+        m->command_before = input[0];
+        m->velocity_before = v;
+    } else {
+        v = placed ? (input[n] - input[0]) / period : input[0];
+        if (c->acceleration_feedforward != 0.0) slope = ((placed ? (input[2 * n] - input[n]) / period : input[n]) - v) / period;
+    }
+    pushed = c->acceleration_feedforward * slope;
+    rubbed = c->friction_feedforward * (v > 0.0 ? 1.0 : v < 0.0 ? -1.0 : 0.0);
+    m->fed = pushed + rubbed;
+    return v;
+}
+
+/* The velocity command; the position controller acts at some of the samples, and its command is held until the next. */
+static double gaident_servo_command(const gaident_servo *c, gaident_servo_memory *m, const double *input, double angle) {
+    if (m->until == 0) {
+        const double forward = c->velocity_feedforward * gaident_feedforward(c, m, input);
+        m->until = c->position_every;
+        m->asked = c->position_gain != 0.0 ? fma(c->position_gain, input[0] - angle, forward) : input[0];
+    }
+    --m->until;
+    return gaident_filtered(&c->command_filters, &m->command, m->asked);
+}
+
+/* The torque under the velocity command r at the measured velocity, as csrc/gaident/control/servo.hpp has it. */
+static double gaident_servo_torque(const gaident_drive *k, gaident_memory *s, gaident_servo_memory *m, double r, double measured) {
+    const gaident_servo *c = k->servo;
+    const double w = gaident_filtered(&c->velocity_filters, &m->velocity, measured), e = r - w;
+    const double proportional = fma(k->kp, fma(c->command_weight, r, -w), m->fed);
+    double I = gaident_clip(fma(k->g, e, s->stored), gaident_integrator_limit(k));
+    const double v = proportional + I;
+    double u = gaident_clip(v, k->torque_limit);
+    if (c->anti_windup == GAIDENT_TRACKING) {
+        I = fma(u - v, c->tracking, I);
+    } else if (c->anti_windup == GAIDENT_HOLD && (v - u) * e > 0.0) { /* limited, and driven further */
+        I = m->integral;
+        u = gaident_clip(proportional + I, k->torque_limit);
+    }
+    m->integral = I;
+    s->stored = fma(c->before, e, I);
+    return gaident_filtered(&c->torque_filters, &m->torque, u);
+}
+
+/* The controller's samples of a step; what is given back is of the first of them. */
+static double gaident_servo_step(const gaident_drive *k, gaident_memory *s, gaident_servo_memory *m, double *issued,
+                                 const double *input, double *torque) {
+    double y = 0.0;
+    int i;
+    for (i = 0; i < k->servo->samples; ++i) {
+        const double w = gaident_reading(k, s), r = gaident_followed(k, s, gaident_servo_command(k->servo, m, input + i, s->angle));
+        const double u = gaident_servo_torque(k, s, m, r, w);
+        if (i == 0) {
+            y = w;
+            *torque = u;
+        }
+        gaident_act(k, s, issued, u);
+    }
+    return y;
+}
+
+/* One step under an input, or with a servo several; `servo` is its memory. */
+static double gaident_step(const gaident_drive *k, gaident_memory *s, gaident_servo_memory *servo, double *issued,
+                           const double *input, double *torque) {
+    if (k->servo) return gaident_servo_step(k, s, servo, issued, input, torque);
+    if (k->substeps > 0) return gaident_effects_step(k, s, issued, *input, torque);
+    return gaident_linear_step(k, s, *input, torque);
 }
 
 #endif

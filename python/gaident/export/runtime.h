@@ -7,6 +7,9 @@
 
 enum { GAIDENT_ORDER = 14 };       /* of a mechanism, at most */
 enum { GAIDENT_DIFFERENCES = 16 }; /* samples over which the angle is subtracted, at most */
+enum { GAIDENT_FILTERS = 8 };      /* of a controller, one behind the other, at most */
+
+enum { GAIDENT_NO_ANTI_WINDUP, GAIDENT_HOLD, GAIDENT_TRACKING };
 
 enum { /* the effects that act */
     GAIDENT_COULOMB_FRICTION = 1 << 0,
@@ -62,7 +65,27 @@ typedef struct { /* what acts at one end of the shaft */
     struct { double mean, turns, phase; } torque_hum;
 } gaident_shaft;
 
+typedef struct { /* y(n) = b0 u(n) + b1 u(n-1) + b2 u(n-2) - a1 y(n-1) - a2 y(n-2), one behind the other */
+    int count;
+    struct { double b0, b1, b2, a1, a2; } filter[GAIDENT_FILTERS];
+} gaident_filters;
+
+typedef struct { /* what a controller has beyond a bare PI, at its own clock T */
+    int samples;            /* of the controller in a step */
+    double before;          /* integral gain times T times the share of the error before, as g of the newest [N m s/rad] */
+    double command_weight;  /* of the command in the proportional part */
+    int anti_windup;
+    double tracking;        /* T over the tracking time */
+    gaident_filters command_filters, velocity_filters, torque_filters;
+    double position_gain;   /* 1/s; 0: no position controller, and the input is a velocity command [rad/s], else one of position [rad] */
+    int position_every;     /* samples from one of the position controller's to the next */
+    int feeds, past;        /* whether there is a feedforward, and whether its slopes are those over the past period */
+    double slope_time;      /* that period [s] */
+    double velocity_feedforward, acceleration_feedforward, friction_feedforward; /* 1, N m s^2/rad, N m */
+} gaident_servo;
+
 typedef struct {
+    const gaident_servo *servo;            /* 0: the controller is a bare PI, or there is none */
     int closed;                            /* whether there is a controller: the input is a command [rad/s], else a torque [N m] */
     double kp, g;                          /* proportional gain, integral gain times dt/2 [N m s/rad] */
     double torque_limit, integrator_limit; /* N m */
@@ -95,6 +118,19 @@ typedef struct {
     struct { double amplitude, order, phase; } velocity_ripple;
     struct { double step; } velocity_quantisation;
 } gaident_drive;
+
+typedef struct {
+    double x1[GAIDENT_FILTERS], x2[GAIDENT_FILTERS];
+} gaident_filters_memory;
+
+typedef struct {
+    double integral;                        /* N m */
+    gaident_filters_memory command, velocity, torque;
+    double asked, fed;                      /* velocity command before its filters [rad/s]; torque that is fed forward [N m] */
+    int until;                              /* samples until the position controller's next one */
+    int begun;
+    double command_before, velocity_before; /* of the period before, where slopes are those over the past one */
+} gaident_servo_memory;
 
 typedef struct {
     double z, other;           /* deflection [rad], the other friction's torque one substep ago [N m] */

@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 from gaident import _core
 from gaident.checks import known_keys, real_number
 from gaident.control import core
+from gaident.control.controller import Controller
 from gaident.control.pi import PI, checked_pi
 from gaident.errors import ModelError
 from gaident.models.discrete import Discrete, require_strictly_proper
@@ -304,7 +305,7 @@ class Model:
         self,
         path: str | os.PathLike[str] | None,
         dt: float,
-        controller: PI | None = None,
+        controller: Controller | None = None,
         *,
         name: str | None = None,
         substeps: int | None = None,
@@ -320,14 +321,16 @@ class Model:
         path : str or path-like, or None
             File to write; None: none is written.
         dt : float
-            Sample time [s].
-        controller : PI, optional
-            With one the file is the closed loop, command [rad/s] to velocity [rad/s].
+            Sample time of its steps [s].
+        controller : PI or Cascade, optional
+            With one the file is the closed loop, command [rad/s], or with a position controller position command [rad], to
+            velocity [rad/s].
+            One with a period of its own takes dt/period samples a step, and a number for each.
             None: the drive alone, torque [N m] (held over each sample) to velocity.
         name : str, optional
             Beginning of every C name; None: that of the file.
         substeps : int, optional
-            Steps per sample of a model with effects; None: as many as it needs.
+            Steps per sample (of the controller, where it is the faster one) of a model with effects; None: as many as it needs.
         axis : str, optional
             "rotary", or "linear" for units of m and N in the file's comments.
 
@@ -341,6 +344,8 @@ class Model:
         ModelError
             For user-defined effects, effects in the continuous loop, p = 0 outside it,
             and a dt, name or substeps that are none.
+        ControllerError
+            For a controller with a number that is None, and a dt that is no whole multiple of its period.
         SettingsError
             For another axis.
         """

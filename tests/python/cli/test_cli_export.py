@@ -42,7 +42,7 @@ def test_c_is_what_the_model_writes(here: Path, result: ga.Diagnosis, capsys: py
     assert main(["export", "run.json", "--to", "c", "--dt", "1e-3"]) == 2  # no file is lost that was not named
     assert "such a file already" in capsys.readouterr().err
     assert main(["export", "run.json", "--to", "c", "--dt", "1e-3", "--closed", "--out", "run.c"]) == 2
-    assert "--closed" in capsys.readouterr().err
+    assert "--closed: the result is that of an open loop and has no controller" in capsys.readouterr().err
     assert main(["export", "run.json", "--to", "c", "--out", "run.c"]) == 2
     assert "give --dt" in capsys.readouterr().err
 

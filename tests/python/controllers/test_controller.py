@@ -113,10 +113,10 @@ TAKE_ANY: dict[str, Callable[[Any], object]] = {
     "initial_state": lambda c: ga.initial_state(DRIVE, REC, c),
     "identify": lambda c: ga.identify(REC, c),
     "diagnose": lambda c: ga.diagnose(REC, c),
+    "to_c": lambda c: DRIVE.model().to_c(None, 1e-3, c),
 }
 TAKE_A_BARE_PI: dict[str, Callable[[Any], object]] = {
     "discrete": lambda c: DRIVE.model().discrete(1e-3, c),
-    "to_c": lambda c: DRIVE.model().to_c("drive.c", 1e-3, c),
     "least_squares": lambda c: ga.least_squares(REC, 2, c),
 }
 

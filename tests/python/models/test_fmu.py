@@ -23,10 +23,15 @@ LOOP = ga.PI(0.02, 0.6)
 ONE = ga.OneMass(J=3e-4, D=0.004).model()
 TWO = ga.TwoMass(JM=1.02e-4, DM=0.003, JL=5.815e-4, DL=0.008, KG=2.59, DG=1e-3).model()
 COMMAND = np.repeat([20.0, 60.0, -40.0, -5.0, 5.0, 0.0], 60)
+ANGLE = 1.0 - np.cos(np.maximum(np.linspace(-0.2, 6.0, 360), 0.0))
+DIGITAL = ga.PI(
+    0.02, 0.6, rule="backward", command_weight=0.7, torque_limit=0.4, anti_windup="tracking", tracking_time=4e-3,
+)  # fmt: skip
+LOW, NOTCH = (ga.LowPass(time_constant=0.8e-3),), (ga.Notch(frequency=110.0, numerator_damping=0.1, denominator_damping=0.7),)
 
 # Model, controller, substeps of the simulation, and whether the bits are the same.
 # Without limits and effects the simulation steps one equation of the whole loop; with effects the order of a few sums differs.
-CASES: dict[str, tuple[ga.Model, ga.PI | None, int | None, bool]] = {
+CASES: dict[str, tuple[ga.Model, ga.PI | ga.Cascade | None, int | None, bool]] = {
     "alone": (TWO, None, None, True),
     "limited": (TWO, ga.PI(0.02, 0.6, torque_limit=0.4, integrator_limit=0.1), None, True),
     "loose": (TWO.with_effect("backlash", gap=0.01).with_effect("coulomb_friction", torque=0.02), LOOP, None, False),
@@ -35,6 +40,16 @@ CASES: dict[str, tuple[ga.Model, ga.PI | None, int | None, bool]] = {
     ),
     "linear": (TWO, LOOP, None, False),
     "cogging": (TWO.with_effect("cogging", amplitude=0.05, order=6.0, phase=0.3), LOOP, 16, False),
+    "servo": (TWO, ga.Cascade(DIGITAL, torque_filters=LOW, velocity_filters=NOTCH, delay=0.3e-3), None, True),
+    "placed": (
+        TWO,
+        ga.Cascade(
+            DIGITAL, position=ga.P(20.0), position_period=3 * T, velocity_feedforward=0.9, acceleration_feedforward=1e-4,
+            friction_feedforward=0.02, command_filters=LOW, feedforward_over="past",
+        ),
+        None,
+        True,
+    ),
 }  # fmt: skip
 
 
@@ -84,8 +99,9 @@ def answers(fmu: Any, source: np.ndarray) -> np.ndarray:
 @pytest.mark.parametrize("name", CASES)
 def test_an_fmu_steps_as_the_simulation(name: str, fmpy: Any, compiled: None, tmp_path: Path) -> None:
     model, controller, substeps, same_bits = CASES[name]
-    source = COMMAND if controller is not None else 0.01 * COMMAND
-    drive = {"command": source} if controller is not None else {"torque": source}
+    what = "torque" if controller is None else controller.driven_by
+    source = {"torque": 0.01 * COMMAND, "command": COMMAND, "position_command": ANGLE}[what]
+    drive = {what: source}
     expected = ga.run(model, ga.Record(T, velocity=0.0 * source, **drive), controller, substeps=substeps)
     with opened(written(name, tmp_path), fmpy) as fmu:
         time, *found = answers(fmu, source)
@@ -94,6 +110,19 @@ def test_an_fmu_steps_as_the_simulation(name: str, fmpy: Any, compiled: None, tm
         if same_bits:
             assert np.array_equal(answer, wanted)
         np.testing.assert_allclose(answer, wanted, rtol=0.0, atol=1e-12 * np.abs(wanted).max())
+
+
+def test_a_controller_that_is_faster_than_the_steps_of_a_tool(fmpy: Any, compiled: None, tmp_path: Path) -> None:
+    """It steps at its own clock; between two steps of the tool the command is held, as a simulation holds it where it jumps."""
+    controller = ga.Cascade(DIGITAL, period=T / 4, torque_filters=LOW, delay=0.1e-3)
+    expected = ga.run(TWO, ga.Record(T, command=COMMAND, velocity=0.0 * COMMAND), controller)
+    path = ga.to_fmu(TWO, tmp_path / "fast.fmu", T, controller)
+    description = fmpy.read_model_description(str(path), validate=True)
+    assert description.coSimulation.fixedInternalStepSize == str(T / 4) and description.defaultExperiment.stepSize == str(T)
+    with opened(path, fmpy) as fmu:
+        _, *found = answers(fmu, COMMAND)
+    for answer, wanted in zip(found, (expected.velocity, expected.torque, expected.position), strict=True):
+        assert np.array_equal(answer, wanted)
 
 
 def test_a_simulator_runs_it(fmpy: Any, compiled: None, tmp_path: Path) -> None:
@@ -155,6 +184,9 @@ def test_what_is_in_the_file(tmp_path: Path) -> None:
     assert 'fmiVersion="3.0"' in text and 'fixedInternalStepSize="0.001"' in text and 'name="command"' in text
     assert 'unit="m/s"' in text and 'unit="N"' in text and "N m" not in text and "force" in text
     assert source == TWO.to_c(None, T, LOOP, name="linear", axis="linear")
+    with zipfile.ZipFile(written("placed", tmp_path, binary=False)) as archive:
+        placed = archive.read("modelDescription.xml").decode()
+    assert 'name="position_command" valueReference="1" causality="input" variability="continuous" unit="rad"' in placed
     again = written("linear", tmp_path / "..", binary=False, axis="linear")
     assert again.read_bytes() == path.read_bytes()
     again.unlink()
@@ -174,6 +206,11 @@ def test_wrong_use_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> N
         ga.to_fmu(ONE, "axis", T)
     with pytest.raises(ga.GaidentError, match="dt is 0"):
         ga.to_fmu(ONE, tmp_path / "axis.fmu", 0.0)
+    ahead = ga.Cascade(LOOP, position=ga.P(20.0), velocity_feedforward=1.0)
+    with pytest.raises(ga.GaidentError, match=r'feedforward_over is "coming": .*feedforward_over="past"\), or write C with to_c'):
+        ga.to_fmu(ONE, tmp_path / "axis.fmu", T, ahead)
+    with pytest.raises(ga.GaidentError, match="kp is None, not known: give a number here"):
+        ga.to_fmu(ONE, tmp_path / "axis.fmu", T, ga.PI(None, 0.6))
     with pytest.raises(ga.GaidentError, match="binary is 1: give True or False"):
         ga.to_fmu(ONE, tmp_path / "axis.fmu", T, binary=1)  # type: ignore[arg-type]
     with pytest.raises(ga.GaidentError, match=r"no C compiler: 'no-such-cc' is no program here.*binary=False"):

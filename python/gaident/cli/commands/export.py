@@ -12,7 +12,7 @@ from pathlib import Path
 
 from gaident.cli.export_options import FORMS
 from gaident.cli.output import naming, print_json, target_of, write
-from gaident.control.pi import PI, bare_pi
+from gaident.control.controller import Controller
 from gaident.errors import SettingsError
 from gaident.export.c_source import c_name
 from gaident.export.fmu import to_fmu
@@ -65,7 +65,7 @@ def _told(target: Path, args: argparse.Namespace) -> None:
 
 
 def _c_source(result: Diagnosis | Identification, target: Path, args: argparse.Namespace) -> str:
-    """The C99 file; --closed: with the result's controller, command to velocity."""
+    """The C99 file; --closed: with the result's controller, command or position command to velocity."""
     model, loop = _stepped(result, args)
     return model.to_c(None, dt=args.dt, controller=loop, name=c_name(target.stem))
 
@@ -77,17 +77,16 @@ def _fmu(result: Diagnosis | Identification, target: Path, args: argparse.Namesp
         to_fmu(model, target, args.dt, loop, axis=axis, binary=not args.sources, compiler=args.compiler)
 
 
-def _stepped(result: Diagnosis | Identification, args: argparse.Namespace) -> tuple[Model, PI | None]:
+def _stepped(result: Diagnosis | Identification, args: argparse.Namespace) -> tuple[Model, Controller | None]:
     """The model, and with --closed its controller, as they are stepped through in C."""
     if args.dt is None:
         raise SettingsError(f"--to {args.to} needs the sample time of its steps: give --dt [s]")
     model, _ = _linear(result, args)
-    loop = bare_pi(result.controller)
-    if args.closed and loop is None:
+    if args.closed and result.controller is None:
         raise SettingsError(
-            "--closed: in C the controller is a bare PI at the steps of the model; leave it out: torque to velocity"
+            "--closed: the result is that of an open loop and has no controller; leave it out: torque to velocity"
         )
-    return model, loop if args.closed else None
+    return model, result.controller if args.closed else None
 
 
 def _linear(result: Diagnosis | Identification, args: argparse.Namespace) -> tuple[Model, str]:
