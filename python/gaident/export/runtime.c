@@ -343,18 +343,23 @@ static double gaident_difference(const gaident_drive *k, gaident_memory *s, doub
     return s->velocity_difference.output = all * k->velocity_difference.per_samples;
 }
 
-static double gaident_track(const gaident_drive *k, gaident_memory *s, double now, double bend) {
+/* *bend: of the velocity, then of what is given back; but for a servo what is behind it takes that for a straight line. */
+static double gaident_track(const gaident_drive *k, gaident_memory *s, double now, double *bend) {
     const double step = now - s->velocity_observer.w, behind = s->velocity_observer.output - s->velocity_observer.w;
-    const double slope = s->velocity_observer.slope;
+    const double slope = s->velocity_observer.slope, output = s->velocity_observer.output;
+    double ends, moved;
     s->velocity_observer.output =
-        now + fma(k->velocity_observer.of_bend, bend,
+        now + fma(k->velocity_observer.of_bend, *bend,
                   fma(k->velocity_observer.of_step, step,
                       fma(k->velocity_observer.of_v, slope, k->velocity_observer.of_y * behind)));
     s->velocity_observer.slope =
-        fma(k->velocity_observer.slope_of_bend, bend,
+        fma(k->velocity_observer.slope_of_bend, *bend,
             fma(k->velocity_observer.slope_of_step, step,
                 fma(k->velocity_observer.slope_of_v, slope, k->velocity_observer.slope_of_y * behind)));
     s->velocity_observer.w = now;
+    ends = (now - s->velocity_observer.output) - behind;
+    moved = fma(s->velocity_observer.output - output, 2.0, s->velocity_observer.slope - slope);
+    *bend = k->servo ? fma(-moved, k->velocity_observer.lag, fma(ends, 0.5, *bend)) : 0.0;
     return s->velocity_observer.output;
 }
 
@@ -455,10 +460,7 @@ static void gaident_act(const gaident_drive *k, gaident_memory *s, double *issue
             y_next = gaident_difference(k, s, y_next, bend);
             bend = 0.0;
         }
-        if (k->effects & GAIDENT_VELOCITY_OBSERVER) {
-            y_next = gaident_track(k, s, y_next, bend);
-            bend = 0.0;
-        }
+        if (k->effects & GAIDENT_VELOCITY_OBSERVER) y_next = gaident_track(k, s, y_next, &bend);
         if (k->effects & GAIDENT_VELOCITY_FILTER) gaident_filter(k, s, y_next, bend);
     }
 }

@@ -42,9 +42,28 @@ def test_c_is_what_the_model_writes(here: Path, result: ga.Diagnosis, capsys: py
     assert main(["export", "run.json", "--to", "c", "--dt", "1e-3"]) == 2  # no file is lost that was not named
     assert "such a file already" in capsys.readouterr().err
     assert main(["export", "run.json", "--to", "c", "--dt", "1e-3", "--closed", "--out", "run.c"]) == 2
-    assert "--closed: the result is that of an open loop and has no controller" in capsys.readouterr().err
+    assert "--closed: the result has no controller, the torque drove its model" in capsys.readouterr().err
     assert main(["export", "run.json", "--to", "c", "--out", "run.c"]) == 2
     assert "give --dt" in capsys.readouterr().err
+
+
+def test_c_and_fmu_with_the_controller_of_the_result(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    command = np.repeat([0.0, 10.0, -6.0, 4.0], 100)
+    low = (ga.LowPass(2e-3),)
+    controller = ga.Cascade(ga.PI(0.05, 0.8, rule="backward"), period=0.5e-3, torque_filters=low, acceleration_feedforward=1e-3)
+    drive = ga.OneMass(J=0.01, D=0.05).model()
+    answer = ga.run(drive, ga.Record(1e-3, command=command, velocity=0.0 * command), controller)
+    noise = 1e-3 * np.random.default_rng(1).standard_normal(400)
+    rec = ga.Record(1e-3, command=command, velocity=answer.velocity + noise, torque=answer.torque)
+    found = ga.identify(rec, controller, ga.SearchSpace(gain=(10.0, 1000.0), p=(1, 1), q=(0, 0)))
+    found.save("idn.json")
+    assert main(["export", "idn.json", "--to", "c", "--dt", "1e-3", "--closed"]) == 0
+    assert Path("idn.c").read_text() == found.model.to_c(None, dt=1e-3, controller=controller, name="idn")
+    assert main(["export", "idn.json", "--to", "fmu", "--dt", "1e-3", "--closed", "--sources"]) == 2
+    assert 'feedforward_over is "coming"' in capsys.readouterr().err
 
 
 def test_c_of_any_file_name_compiles(here: Path) -> None:

@@ -143,6 +143,15 @@ CASES: dict[str, Case] = {
         .with_effect("velocity_quantisation", step=0.05)
         .with_effect("torque_lag", time_constant=1e-3),
     ),
+    "with_path_and_sensor": Case(
+        clocked(WHOLE, 4, 2),
+        TWO.with_effect("torque_saturation", limit=0.3)
+        .with_effect("torque_dead_band", width=0.01)
+        .with_effect("torque_lag", time_constant=1e-3)
+        .with_effect("velocity_difference", samples=3.0)
+        .with_effect("velocity_observer", bandwidth=900.0)
+        .with_effect("velocity_filter", time_constant=1e-3),
+    ),
 }
 
 

@@ -84,7 +84,7 @@ def _stepped(result: Diagnosis | Identification, args: argparse.Namespace) -> tu
     model, _ = _linear(result, args)
     if args.closed and result.controller is None:
         raise SettingsError(
-            "--closed: the result is that of an open loop and has no controller; leave it out: torque to velocity"
+            "--closed: the result has no controller, the torque drove its model; leave it out: torque to velocity"
         )
     return model, result.controller if args.closed else None
 
