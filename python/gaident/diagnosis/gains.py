@@ -285,14 +285,16 @@ def _moved_by_torque_noise(model: Model, scored: Sequence[tuple[Record, int]]) -
 def start_state(model: Model, rec: Record, controller: Controller | None, read: Controller | None = None) -> Vector | None:
     """Initial state of the model at the record's start; None where it starts from rest, or moves and the loop has limits.
 
-    At rest the integral may be a load's torque, which the logged torque shows.
+    The logged torque shows what the integrator held, at rest for a load, and drives the mechanism over the head of a record that
+    begins in motion.
     In motion a model with effects is not linear in its state: two steps of Gauss and Newton over the record's head,
     from the first velocity.
     """
     loop = read or controller
-    if controller is not None and loop is not None and (stored := stored_torque(rec, loop)):
-        return np.append(np.zeros(model.mechanism.order), stored)
     pi = bare_pi(loop)
+    if controller is not None and loop is not None and (stored := stored_torque(rec, loop)):
+        moved = start_state(model, rec, None, loop) if starts_moving(rec, pi) else None
+        return np.append(np.zeros(model.mechanism.order) if moved is None else moved, stored)
     if controller is None and not starts_moving(rec, pi):
         before = torque_before(rec, load_before(rec, read))
         return np.append(np.zeros(model.mechanism.order), before) if before else None

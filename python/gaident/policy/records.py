@@ -25,7 +25,7 @@ class Records:
     repeats: float = record(0.9, "1", "share of differences that are not 0: below, a velocity is quantised", DRIVES)
     rest_steps: float = record(1.5, "steps", "of that quantisation: a first velocity above is no rest", DRIVES)
     rest_emf: float = record(0.01, "1", "of the largest voltage: a motor whose first back-EMF is less starts at rest", WINDING)
-    rest_share: float = record(0.6, "1", "of the first command: a first velocity up to it is the response from rest", SUCCESS)
+    rest_share: float = record(0.6, "1", "of the first command, or the top speed, to which a response from rest begins", SUCCESS)
     outlier_far: float = record(9.0, "1", "standard deviations from its neighbours, from which a sample may be an outlier", LOOP)
     outlier_missed: float = record(0.4, "1", "of that distance, by which the lines from either side, and a model, miss it", LOOP)
     outlier_alone: float = record(0.5, "1", "of that distance: where two samples near by are as far off, the axis rings", LOOP)

@@ -7,6 +7,7 @@ import pytest
 from numpy.typing import NDArray
 
 import gaident as ga
+from drive_rig import Noise, Plant, rig, skip_without_library
 from gaident.diagnosis import work
 from gaident.diagnosis.experiments.excitation import excitation
 
@@ -104,3 +105,36 @@ def test_an_impossible_damping_is_not_excused_by_a_friction_that_is_not_there() 
     dia = ga.diagnose(rec)
     assert dia.mechanics["viscous_friction"].value == pytest.approx(-2e-4, rel=0.05)
     assert dia.verdict == "unexplained" and not any("do not tell viscous" in note for note in dia.notes)
+
+
+AXIS = Plant(J=3e-4, D=2e-3, kp=0.03, ki=1.0, dt=DT)
+TORQUES = {
+    "torque_hum": {"amplitude": 0.05, "frequency": 100.0 / np.pi, "phase": 0.4},  # at 40 rad/s the fifth order
+    "cogging": {"amplitude": 0.05, "order": 5.0, "phase": 0.4},
+}
+
+
+def at_one_speed(effects: dict[str, dict[str, float]], cut: int) -> ga.Diagnosis:
+    """A step to 40 rad/s from rest, or a part of it in which that speed is held."""
+    skip_without_library()
+    rec = rig(AXIS, np.append(np.zeros(20), np.full(700, 40.0)), effects, Noise(white=0.05), seed=3)
+    return ga.diagnose(rec[cut:], ga.PI(AXIS.kp, AXIS.ki))
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("effects", [{}, {"coulomb_friction": {"torque": 0.05}}], ids=["clean", "dry friction"])
+def test_a_record_that_holds_one_speed_has_nothing_wrong(effects: dict[str, dict[str, float]]) -> None:
+    """Nothing but noise moves it: no inertia that counts, and no cause."""
+    dia = at_one_speed(effects, 200)
+    assert dia.verdict == "adequate" and not dia.causes, dia.summary()
+    assert dia.after.rmse == pytest.approx(0.05, rel=0.1)
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("name", list(TORQUES))
+def test_a_hum_and_a_cogging_of_one_held_speed_are_one_class_and_an_experiment_separates_them(name: str) -> None:
+    assert [(f.effect, f.alternatives) for f in at_one_speed({name: TORQUES[name]}, 0).causes] == [(name, ())]  # the run up
+    dia = at_one_speed({name: TORQUES[name]}, 200)
+    (found,) = dia.causes
+    assert {"torque_hum", "cogging"} <= {found.effect, *found.alternatives} and dia.verdict == "explained"
+    assert dia.next_experiment is not None and {"torque_hum", "cogging"} <= {*dia.next_experiment.separates}
