@@ -298,7 +298,7 @@ def open_log(source: str | os.PathLike[str] | Any, options: TextOptions) -> Iter
     with ExitStack() as stack:
         if is_frame(source):
             _only_for_text("a DataFrame", "no file", options)
-            table = frame_table(source)
+            table = frame_table(source).checked()
             yield replace(table, columns=tuple(map(_timed, table.columns)))
             return
         file, shown = _file(source)
@@ -307,7 +307,7 @@ def open_log(source: str | os.PathLike[str] | Any, options: TextOptions) -> Iter
         reader = _choose(shown, head)
         if reader.name != "text":
             _only_for_text(shown, reader.name, options)
-        table = reader.open(shown, file, options, stack)
+        table = reader.open(shown, file, options, stack).checked()
         yield replace(table, form=table.form or reader.name, columns=tuple(map(_timed, table.columns)))
 
 

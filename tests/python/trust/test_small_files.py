@@ -15,6 +15,7 @@ import numpy as np
 import pytest
 
 import gaident as ga
+from gaident.data.formats import table
 from gaident.errors import ReadError
 
 ROWS = "".join(f"{k * 1e-3:.3f},{k % 7},{k % 5}\n" for k in range(40))
@@ -49,6 +50,22 @@ def test_a_text_takes_no_minutes(name: str, tmp_path: Path) -> None:
         except ReadError as error:
             assert "\n" not in str(error)
     assert time.perf_counter() - began < 10.0
+
+
+def test_more_columns_than_a_log_has_are_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    assert table.MOST_COLUMNS == 100_000 and table.LONGEST_NAME == 10_000  # as SECURITY.md says
+    path = tmp_path / "log.csv"
+    path.write_text(f"{','.join('abcd')}\n" + "1,2,3,4\n" * 30)
+    with monkeypatch.context() as few:
+        few.setattr(table, "MOST_COLUMNS", 3)
+        with pytest.raises(ReadError, match=r"log\.csv: 4 columns, and at most 3 are read; save those that belong"):
+            ga.columns(path)
+    np.savez(tmp_path / "log.npz", velocity=np.zeros(30), **{"a" * 10_001: np.zeros(30)})
+    with pytest.raises(ReadError, match=r"the name of column #1 is 10001 characters long \('aaaaaaaaaaaaaaaaaaaa'\.\.\.\)"):
+        ga.read(tmp_path / "log.npz", {"velocity": "velocity"}, dt=1e-3)
+    path.write_text(f"{HEAD} {'a' * 10_000}\n{ROWS}")
+    with pytest.raises(ReadError, match=r"the name of column #2 is 10009 characters long.*a quotation mark may lack its end"):
+        ga.columns(path)
 
 
 LIMITED = """

@@ -23,6 +23,8 @@ BLOCK = 1 << 16  # no decision: memory; values of a block
 _NUMBER_SIGN = re.compile(r"#\s*(\d+)")
 _PICK = re.compile(r"(.+)\[\s*(:|-?\d+)\s*,\s*(:|-?\d+)\s*\]")
 _LISTED = 40  # no decision: how many columns a message names
+MOST_COLUMNS = 100_000  # no decision: what an argument may be: columns of a log
+LONGEST_NAME = 10_000  # no decision: what an argument may be: characters of a column's name
 
 
 def first_line(error: BaseException) -> str:
@@ -117,6 +119,21 @@ class LogTable:
     batches: Callable[[Sequence[Column]], Iterator[LogTable]] | None = None
     form: str = ""
     remark: str = ""
+
+    def checked(self) -> LogTable:
+        """The table, where it has no more columns, and none of a longer name, than a log has; raises ReadError."""
+        if len(self.columns) > MOST_COLUMNS:
+            raise ReadError(
+                f"{self.path}: {len(self.columns)} columns, and at most {MOST_COLUMNS} are read; save those that belong to the "
+                "drive"
+            )
+        for k, column in enumerate(self.columns):
+            if len(column.key) > LONGEST_NAME:
+                raise ReadError(
+                    f"{self.path}: the name of column #{k} is {len(column.key)} characters long ({column.key[:20]!r}...), and at "
+                    f"most {LONGEST_NAME} are read; a quotation mark may lack its end, or the rows may stand in one line"
+                )
+        return self
 
     def place(self, row: int) -> str:
         """Where a row stands, for messages."""
