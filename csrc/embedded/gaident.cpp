@@ -20,6 +20,8 @@ gaident_settings gaident_paper_settings(gaident_loop loop) {
         .loop = loop, .seed = 0, .crossover = 0.9, .mutation = 0.01, .tournament = 2, .error_weight = 1.0, .order_weight = 2.0};
 }
 
+int gaident_version() { return GAIDENT_H_VERSION; }
+
 size_t gaident_bytes() { return sizeof(gaident_search); }
 
 gaident_search* gaident_configure(void* memory, size_t bytes, const gaident_settings* s) {

@@ -21,6 +21,10 @@
 extern "C" {
 #endif
 
+/* Of this interface: 10000 major + 100 minor + patch of gaident's version. An object of another major or, below 1.0, minor version may
+ * have other structures: compare it with gaident_version() once, when the drive starts. */
+#define GAIDENT_H_VERSION 100
+
 typedef struct gaident_search gaident_search;
 
 /* The velocity controller, a PI: T = kp e + ki integral of e dt, e = command - velocity. */
@@ -67,6 +71,9 @@ typedef struct {
 
 /* The paper's settings (Table II) for a loop. */
 gaident_settings gaident_paper_settings(gaident_loop loop);
+
+/* GAIDENT_H_VERSION as the object was compiled with it. */
+int gaident_version(void);
 
 /* Memory that a search takes [bytes]. */
 size_t gaident_bytes(void);

@@ -43,6 +43,7 @@ int main(void) {
     settings.seed = 1;
     gaident_model model;
 
+    CHECK(gaident_version() == GAIDENT_H_VERSION);
     CHECK(gaident_bytes() <= sizeof memory);
     CHECK(gaident_configure(NULL, sizeof memory, &settings) == NULL);
     CHECK(gaident_configure(memory, sizeof memory, NULL) == NULL);

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import platform
+import re
 import shutil
 import subprocess
 from importlib import import_module
@@ -17,6 +18,7 @@ from gaident.results.settings import ARITHMETICS, DRIVE_ARITHMETICS
 from places import ROOT
 
 EMBEDDED = ROOT / "csrc" / "embedded"
+SYMBOLS = (EMBEDDED / "gaident.symbols").read_text().split()
 MODEL = ga.Model(6545.29, poles=(-15.41, -10.3 + 150.9j, -10.3 - 150.9j), zeros=(-4.26 + 93.98j, -4.26 - 93.98j))
 LOOP = ga.PI(0.0232 * 5.5637, 1.367 * 5.5637, loop="continuous")
 SPACE = ga.SearchSpace(gain=(1e3, 2e4), real=(0.0, 60.0), imaginary=(0.0, 250.0))
@@ -128,6 +130,19 @@ def test_the_c_interface_is_c99() -> None:
     assert built.returncode == 0, built.stderr
 
 
+def test_the_c_interface_has_the_projects_version() -> None:
+    stated = re.search(r'^version = "(\d+)\.(\d+)\.(\d+)', (ROOT / "pyproject.toml").read_text(), re.MULTILINE)
+    defined = re.search(r"^#define GAIDENT_H_VERSION (\d+)$", (EMBEDDED / "gaident.h").read_text(), re.MULTILINE)
+    assert stated is not None and defined is not None
+    major, minor, patch = (int(part) for part in stated.groups())
+    assert int(defined[1]) == 10000 * major + 100 * minor + patch
+
+
+def test_the_list_of_symbols_is_what_the_header_declares() -> None:
+    declared = re.findall(r"^[a-z][\w* ]*?\b(gaident_\w+)\([^;{]*\);", (EMBEDDED / "gaident.h").read_text(), re.MULTILINE)
+    assert sorted(declared) == SYMBOLS
+
+
 def built(*command: object, given: str = "") -> str:
     """What a compiler, or what it made, says."""
     done = subprocess.run([str(c) for c in command], input=given, capture_output=True, text=True)
@@ -158,6 +173,10 @@ def test_the_c_interface_makes_the_desks_run(rec: ga.Record, tmp_path: Path, gen
     # Unoptimised: the same operations, compiled sooner.
     flags = f"-std=c++20 -O0 -ffp-contract=off -ffreestanding -fno-exceptions -fno-rtti -DGAIDENT_ARITHMETIC={name} -I{genes}"
     built(cxx, *flags.split(), "-c", "-o", tmp_path / "core.o", EMBEDDED / "gaident.cpp")
+    if nm := shutil.which("nm"):
+        exported = [line.split() for line in built(nm, "--extern-only", "--defined-only", tmp_path / "core.o").splitlines()]
+        assert sorted(name for *_, kind, name in exported if kind not in "VWu") == SYMBOLS  # what is C++ may be there twice
+        assert all(name.startswith("_Z") for *_, kind, name in exported if kind in "VWu")
     caller = ROOT / "tests" / "cpp" / "c_interface.c"
     strict = ("-std=c99", "-Wall", "-Wextra", "-Wpedantic", "-Werror")
     built(cc, *strict, f"-I{EMBEDDED}", "-o", program, caller, tmp_path / "core.o", "-lm")  # fma, where the processor has none
