@@ -197,8 +197,12 @@ FORMATS: list[tuple[str, Callable[[Path], None], dict[str, str | int | None]]] =
 ]
 
 
+# Each reading of an MDF is 2 s of import.
+IN_TURN = [pytest.param(*row, id=row[0], marks=[pytest.mark.long] if row[1] is mdf else []) for row in FORMATS]
+
+
 @pytest.mark.filterwarnings("ignore::DeprecationWarning")
-@pytest.mark.parametrize(("file", "make", "columns"), FORMATS, ids=[f"{row[0]}" for row in FORMATS])
+@pytest.mark.parametrize(("file", "make", "columns"), IN_TURN)
 def test_formats_of_other_libraries(
     file: str, make: Callable[[Path], None], columns: dict[str, str | int | None], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -249,6 +253,7 @@ def test_damaged_files_of_other_libraries_never_end_in_a_foreign_error(
     assert capfd.readouterr() == ("", "")
 
 
+@pytest.mark.long
 @pytest.mark.filterwarnings("ignore::DeprecationWarning")
 @pytest.mark.parametrize("version", ["3.30", "4.10"])
 def test_a_channel_outside_its_record_is_refused(version: str, tmp_path: Path) -> None:

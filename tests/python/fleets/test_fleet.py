@@ -210,6 +210,7 @@ def test_ctrl_c_keeps_what_is_done(tmp_path: Path, monkeypatch: pytest.MonkeyPat
     assert 2 <= done - 1 <= len(rows) <= done < 150  # a result that was just written when Ctrl-C came may have no row yet
 
 
+@pytest.mark.long
 def test_the_page_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     pytest.importorskip("pyarrow")
     pytest.importorskip("duckdb")
@@ -242,6 +243,7 @@ def test_a_full_disk_keeps_what_is_done(inside: Path, monkeypatch: pytest.Monkey
     assert content(inside / "full") == content(inside / "whole")
 
 
+@pytest.mark.long
 def test_dask_loses_no_log_with_a_worker(inside: Path) -> None:
     distributed = pytest.importorskip("distributed", reason="Dask is not installed: pip install 'gaident[dask]'")
     import warnings

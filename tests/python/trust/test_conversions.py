@@ -106,6 +106,7 @@ def written(folder: Path, version: str, **signals: Any) -> Path:
     return path
 
 
+@pytest.mark.long
 @pytest.mark.filterwarnings("ignore")
 @pytest.mark.parametrize("version", ["3.30", "4.10"])
 def test_a_file_s_conversions_are_those_of_its_library(version: str, tmp_path: Path) -> None:
@@ -124,6 +125,7 @@ def test_a_file_s_conversions_are_those_of_its_library(version: str, tmp_path: P
             np.testing.assert_allclose(read[name], mdf.get(name).samples, rtol=1e-15, err_msg=name)
 
 
+@pytest.mark.long
 @pytest.mark.filterwarnings("ignore")
 @pytest.mark.parametrize("version", ["3.30", "4.10"])
 def test_a_formula_runs_no_code_and_is_named(version: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -144,6 +146,7 @@ def test_a_formula_runs_no_code_and_is_named(version: str, tmp_path: Path, monke
     sys.modules.pop("sympy", None)
 
 
+@pytest.mark.long
 @pytest.mark.filterwarnings("ignore")
 def test_values_that_a_file_marks_as_invalid_are_not_taken(tmp_path: Path) -> None:
     asammdf = pytest.importorskip("asammdf", reason="asammdf is not installed: pip install 'gaident[mdf]'")
