@@ -15,6 +15,7 @@ night over all logs, or again after it was stopped. Exit code 1 where no log at 
 FLEET_EXAMPLES = """\
 examples:
   gaident fleet 'logs/**/*.csv' --drive drive.toml --out fleet
+  gaident fleet 'logs/**/*.csv' --drive drive.toml --out fleet --resume    a run that was stopped goes on
   gaident fleet 'logs/**/*.csv' --drive drive.toml --names '(?P<axis>x\\d+)_(?P<time>[\\dT-]+)'
 """
 TRENDS_HELP = """\
@@ -38,6 +39,7 @@ def add_fleet_options(parser: argparse.ArgumentParser) -> None:
     g.add_argument("--temperature", metavar="NAME", help="column with the temperature, whose mean stands in the tables")
     g.add_argument("--method", choices=("diagnose", "identify"), default="diagnose", help="what is done (default: diagnose)")
     g.add_argument("--quick", action="store_true", help="name the first cause and stop")
+    g.add_argument("--resume", action="store_true", help="go on where a run was stopped, and keep what is there (default)")
     g.add_argument("--again", action="store_true", help="make the results of these logs again, though they are there")
     g.add_argument("--seed", type=int, default=0, metavar="N", help="same seed, same result (default 0)")
     g.add_argument("--workers", type=int, metavar="N", help="processes (default: one for each processor)")

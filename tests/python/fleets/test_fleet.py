@@ -277,6 +277,14 @@ def test_the_command_does_the_same(inside: Path, capsys: pytest.CaptureFixture[s
     options = ["--out", "whole", "--method", "identify", "--temperature", "heat", "--workers", "1"]
     assert main(["fleet", "logs/x/*.csv", *options, "--loop", "open"]) == 0
     assert "3 logs: 3 done, 0 failed" in capsys.readouterr().out
+    before = content(Path("whole"))
+    assert main(["fleet", "logs/x/*.csv", *options, "--loop", "open", "--resume"]) == 0
+    assert "3 of them before" in capsys.readouterr().out and content(Path("whole")) == before
+    assert main(["fleet", "logs/x/*.csv", *options, "--loop", "open", "--again"]) == 0
+    assert "0 of them before" in capsys.readouterr().out
+    assert main(["fleet", "logs/x/*.csv", *options, "--loop", "open", "--resume", "--again"]) == 2
+    err = capsys.readouterr().err
+    assert "--resume" in err and "--again" in err and "leave one of them out" in err and err.count("\n") == 1
     assert main(["fleet", "logs/none/*.csv", *options]) == 2
     assert "no file fits this pattern" in capsys.readouterr().err
 

@@ -8,6 +8,7 @@ from dataclasses import asdict
 
 from gaident.cli.drive import drive_of
 from gaident.cli.output import print_json
+from gaident.errors import SettingsError
 from gaident.fleets.fleet import fleet
 from gaident.show.progress_bar import Progress
 
@@ -15,6 +16,8 @@ __all__ = ["fleet_command"]
 
 
 def fleet_command(args: Namespace) -> int:
+    if args.resume and args.again:
+        raise SettingsError("--resume keeps the results that are there, --again makes them again: leave one of them out")
     drive = drive_of(args)
     with Progress(None if args.quiet else sys.stderr) as progress:
         found = fleet(
