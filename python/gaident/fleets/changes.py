@@ -4,21 +4,28 @@ Of an axis, y_i is the logarithm of a parameter x_i whose first 20 logs (`course
 temperature where it is logged.
 Below a tenth of the median of these 20, y is the tangent of the logarithm there, which goes on where x is 0 or negative.
 Where the first 20 are not all positive, y is the parameter over the median of their sizes.
-Behind each log n, the last m logs, m = 3, 5, 8, 13, 21 and 34, are compared with those before them, b of them, 20 or more:
+Behind each log n, the last m logs, m = 3, 4, 5, 8, 13, 21 and 34, are compared with those before them, b of them, 20 or more:
 
-    y_i = a + c (T_i - T)  is fitted to those before, twice, the second time without what is 3.5 deviations off (`course_clip`),
-    r_i = y_i - a - c (T_i - T),  v_i = s_i^2 + t^2,  t^2 what the scatter of r shows beyond the s_i,
-    z   = sum of clip(r_i/sqrt(v_i), -h, h) over the m logs / sqrt(m + u' C u + w^2 c^2 var(T)),
-    h   = 3.5 where m = 3, else the larger of 3.5 and the size of the median of r_i/sqrt(v_i),
+    y_i = a + c (T_i - T)  is fitted to those before, three times, without what is 3.5 deviations off (`course_clip`) from the
+    second time on,
+    r_i = y_i - a - c (T_i - T),  v_i = s_i^2 + t^2,  t^2 what the scatter of r shows beyond the s_i,  d_i = r_i/sqrt(v_i),
+    z   = sum of clip(d_i, -h, h) over the m logs / sqrt(m + u' C u + w^2 c^2 var(T)),
+    h   = the larger of 3.5 and g + 1.5 (`course_apart`),  g the d that most of the logs and three at least reach to one side,
 
 so that one damaged log counts no more than the others, and logs that agree count as far as they are off.
+Two damaged ones of three make no change.
+The first scale is a median deviation, which twenty logs show to 18 %: what it put too far out comes back in the third fit.
 u is the sum of the rows (1, T_i - T) of the m logs over sqrt(v_i), C the inverse of the normal matrix of the fit.
 The line is fitted to logs with a temperature, where 20 or more have one, else c = 0; T and var(T) are of these logs.
 A log behind them without one is taken for one at T: w is the sum of 1/sqrt(v_i) over such logs, as all of them may have been as
 warm or cold.
 The scale comes from those of b logs that are kept, k the terms of the fit.
-It knows 0.7 (b - k) degrees of freedom (`course_known`), less than all, as what is left out may have been scatter: z is compared
-with the quantile of Student's distribution with so many, at `course_alarm`.
+It knows 0.9 (b - k) degrees of freedom (`course_known`), less than all, as what is left out may have been scatter.
+|z| is compared with the quantile of Student's distribution with so many, of the probability
+
+    p = R/(7 N),  R = `course_alarms` a year,  N logs a year, of the median step of the first 20,
+
+to either side p/2: 7 N tests of a year, were they independent, would give R false alarms; as they share logs they give less.
 A change begins with the m of the largest z, without those at their beginning that are off by less than half their median.
 The next one is looked for behind it.
 What log n says never depends on later logs: a course that is read every night raises the same alarms as one that is read once.
@@ -27,6 +34,7 @@ What log n says never depends on later logs: a course that is read every night r
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 from itertools import pairwise
 
 import numpy as np
@@ -39,8 +47,10 @@ __all__ = ["Scale", "Shift", "levels_of", "shifts_of"]
 
 Vector = NDArray[np.float64]
 
-LENGTHS = (3, 5, 8, 13, 21, 34)  # no decision: a grid of how many logs a change is behind
+LENGTHS = (3, 4, 5, 8, 13, 21, 34)  # no decision: a grid of how many logs a change is behind
 MAD = 1.4826  # no decision: a formula: standard deviations in the median deviation of a normal distribution
+DAILY = 365.25  # no decision: a unit: logs in a year of a log a day
+PASSES = 3  # no decision: a formula: with the median deviation, without what is far off, with what came back
 TANGENT = 0.1  # no decision: a formula: of the median, where the logarithm goes on straight
 
 
@@ -109,14 +119,18 @@ class Scale:
         return (float(np.expm1(size)), float(np.exp(size) * std)) if self.logarithm else (size, std)
 
 
-def shifts_of(values: Vector, deviations: Vector, temperatures: Vector | None) -> list[Shift]:
-    """The changes of a course, in the order of time; values and deviations as a `Scale` gives them, nan: no temperature."""
+def shifts_of(values: Vector, deviations: Vector, temperatures: Vector | None, a_year: float = DAILY) -> list[Shift]:
+    """The changes of a course, in the order of time; values and deviations as a `Scale` gives them, nan: no temperature.
+
+    a_year: logs of the course in a year, of which the rate of false alarms is one of so many tests.
+    """
+    alarm = POLICY.course_alarms / (a_year * len(LENGTHS))
     heat = np.full(len(values), np.nan) if temperatures is None else temperatures
     found: list[Shift] = []
     lines: dict[int, _Line] = {}
     begin, n = 0, POLICY.course_before + POLICY.course_after - 1
     while n < len(values):
-        best = _best(values, deviations, heat, begin, n, lines)
+        best = _best(values, deviations, heat, begin, n, lines, alarm)
         if best is None:
             n += 1
             continue
@@ -127,7 +141,7 @@ def shifts_of(values: Vector, deviations: Vector, temperatures: Vector | None) -
     return found
 
 
-def _best(y: Vector, s: Vector, heat: Vector, begin: int, n: int, lines: dict[int, _Line]) -> Shift | None:
+def _best(y: Vector, s: Vector, heat: Vector, begin: int, n: int, lines: dict[int, _Line], alarm: float) -> Shift | None:
     """The change that log n shows, if it does; lines: by the first log behind them."""
     best: Shift | None = None
     for m in LENGTHS:
@@ -135,7 +149,7 @@ def _best(y: Vector, s: Vector, heat: Vector, begin: int, n: int, lines: dict[in
         if m < POLICY.course_after or first - begin < POLICY.course_before:
             continue
         if first not in lines:
-            lines[first] = _line(y[begin:first], s[begin:first], heat[begin:first])
+            lines[first] = _line(y[begin:first], s[begin:first], heat[begin:first], alarm)
         line = lines[first]
         behind = slice(first, n + 1)
         rows = line.rows(heat[behind])
@@ -145,7 +159,7 @@ def _best(y: Vector, s: Vector, heat: Vector, begin: int, n: int, lines: dict[in
         unknown = ~np.isfinite(heat[behind])
         w = float(np.sum(1.0 / sigma[unknown]))
         off = r / sigma
-        bound = max(POLICY.course_clip, abs(float(np.median(off)))) if m >= POLICY.course_agree else POLICY.course_clip
+        bound = max(POLICY.course_clip, _agreed(off) + POLICY.course_apart)
         z = float(np.clip(off, -bound, bound).sum() / np.sqrt(m + u @ line.inverse @ u + w**2 * line.width))
         weights = sigma**-2.0
         size = float(np.median(r))
@@ -158,7 +172,19 @@ def _best(y: Vector, s: Vector, heat: Vector, begin: int, n: int, lines: dict[in
     return best
 
 
-def _line(y: Vector, s: Vector, heat: Vector) -> _Line:
+def _agreed(off: Vector) -> float:
+    """How far off most of the logs are, and course_after of them at least."""
+    far = np.sort(off if off.sum() > 0.0 else -off)
+    return float(far[-max(POLICY.course_after, len(far) // 2 + 1)])
+
+
+@lru_cache(maxsize=1024)  # no decision: as many quantiles as logs of years have
+def _needed(alarm: float, freedom: float) -> float:
+    """The |z| that is as rare as that."""
+    return float(student.isf(0.5 * alarm, freedom))
+
+
+def _line(y: Vector, s: Vector, heat: Vector, alarm: float) -> _Line:
     known = np.isfinite(heat)
     middle = width = 0.0
     if known.sum() >= POLICY.course_before:
@@ -169,7 +195,7 @@ def _line(y: Vector, s: Vector, heat: Vector) -> _Line:
         rows = np.ones((len(y), 1))
     used = np.ones(len(y), dtype=bool)
     scatter = 0.0
-    for last in (False, True):
+    for step in range(PASSES):
         weights = np.where(used, 1.0 / (s**2 + scatter + POLICY.course_scatter**2), 0.0)
         # A temperature that did not change says nothing about its slope: a ridge far below what a degree does.
         normal = (rows * weights[:, None]).T @ rows + np.diag([0.0, *[1e-6] * (rows.shape[1] - 1)])
@@ -177,17 +203,17 @@ def _line(y: Vector, s: Vector, heat: Vector) -> _Line:
         coefficients: Vector = inverse @ (rows * weights[:, None]).T @ y
         r = y - rows @ coefficients
         away = np.abs(r - np.median(r))  # of the middle: two bad logs of twenty move the line
-        if last:
+        if step > 0:
             spread = float(np.sqrt(np.sum(r[used] ** 2) / max(used.sum() - rows.shape[1], 1)))
         else:
             spread = MAD * float(np.median(away))
         scatter = max(spread**2 - float(np.median(s**2)), POLICY.course_scatter**2)
-        if not last:
+        if step < PASSES - 1:
             used = away <= POLICY.course_clip * np.sqrt(s**2 + scatter)
     if rows.shape[1] > 1:
         width = float(coefficients[1] ** 2 * np.var(heat))
     freedom = POLICY.course_known * (len(y) - rows.shape[1])
-    return _Line(coefficients, inverse, scatter, float(student.isf(0.5 * POLICY.course_alarm, freedom)), middle, width)
+    return _Line(coefficients, inverse, scatter, _needed(alarm, freedom), middle, width)
 
 
 def levels_of(values: Vector, shifts: list[Shift]) -> list[tuple[int, int, float]]:

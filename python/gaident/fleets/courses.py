@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from datetime import datetime
+from itertools import pairwise
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -16,9 +18,12 @@ from gaident.fleets.dataset import parts_of, read_part
 from gaident.policy.table import POLICY
 from gaident.results.estimate import ANGULAR
 
-__all__ = ["AxisTables", "Quantity", "RawCourse", "axes_of", "courses_of"]
+__all__ = ["AxisTables", "Quantity", "RawCourse", "axes_of", "courses_of", "logs_a_year"]
 
 Vector = NDArray[np.float64]
+
+HOUR = 3600.0  # no decision: a unit: seconds
+YEAR = 365.25 * 24.0 * HOUR  # no decision: a unit: seconds
 
 FOLLOWED = ("mechanics", "friction", "cause", "linear model")
 """What of the table of parameters has a course; a regression says the same as mechanics and friction, less exactly."""
@@ -93,6 +98,16 @@ def courses_of(parameters: Iterable[Mapping[str, Any]]) -> dict[Quantity, RawCou
             rows.setdefault(quantity, []).append(row)
     order = sorted(rows, key=lambda q: (FOLLOWED.index(q.of), q.effect, q.side, q.order or 0, q.parameter))
     return {quantity: _course(rows[quantity]) for quantity in order}
+
+
+def logs_a_year(times: Sequence[str]) -> float:
+    """How many logs a year a course has, of the median step of its first logs, so that no later one changes it.
+
+    Logs whose times are less than an hour apart count as hourly: names with a day alone say no more of several logs in one.
+    """
+    first = [datetime.fromisoformat(time) for time in times[: POLICY.course_before]]
+    steps = [(b - a).total_seconds() for a, b in pairwise(first)]
+    return YEAR / max(float(np.median(steps)), HOUR)
 
 
 def _is_level(row: Mapping[str, Any]) -> bool:

@@ -13,19 +13,15 @@ __all__ = ["Courses"]
 class Courses:
     """See the module; `gaident.policy.table.rows()` lists these rows among the others."""
 
-    course_alarm: float = course(
-        2e-6, "probability", "of the test of one split of one course, by which it may be a change by chance"
-    )
+    course_alarms: float = course(0.0025, "1/year", "false alarms of one course by chance at most; an axis has some ten courses")
     course_before: int = course(20, "logs", "before a change at least: their scatter is the scale of everything behind them")
     course_after: int = course(3, "logs", "behind a change at least: one or two may be a damaged log")
     course_clip: float = course(3.5, "1", "standard deviations at most by which one log counts for a change")
-    course_agree: int = course(
-        5,
-        "logs",
-        "behind a change, from which on their median says how far one may count: of 2 % damaged ones, three of five are rare",
+    course_apart: float = course(
+        1.5, "1", "standard deviations, by which a log counts further than those behind a change agree: their own scatter"
     )
     course_known: float = course(
-        0.7, "1", "of the logs before a change, that the scale of their scatter knows: what was left out may have been scatter"
+        0.9, "1", "of the logs before a change, that the scale of their scatter knows: what was left out may have been scatter"
     )
     course_material: float = course(0.05, "1", "of the value: a change that is less is none of the axis that matters")
     course_unsure: float = course(0.5, "1", "of a value: one whose deviation is more has no place in a course")

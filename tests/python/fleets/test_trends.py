@@ -13,6 +13,7 @@ import pytest
 import gaident as ga
 from gaident.cli import main
 from gaident.fleets.changes import Scale, shifts_of
+from gaident.fleets.courses import logs_a_year
 from gaident.fleets.dataset import best_format, write_part
 
 DAYS = 90
@@ -122,6 +123,50 @@ def test_logs_that_agree_are_told_soon_and_damaged_ones_are_not() -> None:
     damaged = s * rng.standard_normal(28)
     damaged[[22, 25]] = 1.0
     assert shifts_of(damaged, s, None) == []
+
+
+def weekly(seed: int, at: int, step: float = 0.2) -> tuple[np.ndarray, np.ndarray]:
+    """(y, s) of a log a week for 50 weeks, deviation and scatter 2 % each, a step in week `at`."""
+    rng = np.random.default_rng([77, seed])
+    s = np.full(50, 0.02)
+    y = s * rng.standard_normal(50) + 0.02 * rng.standard_normal(50)
+    return y + np.where(np.arange(50) >= at, np.log1p(step), 0.0), s
+
+
+def test_a_step_of_weekly_logs_is_told_within_three_weeks() -> None:
+    """Of 20 % behind 20 logs, the fewest that there may be; nothing is told of courses without one."""
+    told = [shifts_of(*weekly(k, 20), None, 52.0) for k in range(20)]
+    assert all(shifts for shifts in told) and all(abs(shifts[0].first - 20) <= 1 for shifts in told)
+    assert np.mean([shifts[0].found <= 23 for shifts in told]) >= 0.95
+    assert all(shifts_of(*weekly(k, 50), None, 52.0) == [] for k in range(40, 50))
+
+
+def test_weekly_logs_need_less_than_daily_ones_for_the_same_rate_of_false_alarms() -> None:
+    y, s = weekly(3, 20)
+    found = {a_year: shifts_of(y, s, None, a_year)[0].found for a_year in (4.0, 52.0, 1e9)}
+    assert found[4.0] <= found[52.0] < found[1e9]
+
+
+def test_logs_in_a_year_follow_from_the_first_logs_alone() -> None:
+    times = [(BEGIN + timedelta(weeks=k)).isoformat() for k in range(20)]
+    assert logs_a_year(times) == pytest.approx(365.25 / 7.0)
+    assert logs_a_year(times + [times[-1]] * 50) == logs_a_year(times)
+    assert logs_a_year(times[:1] * 23) == pytest.approx(365.25 * 24.0)  # no times apart: as if hourly
+
+
+@pytest.mark.parametrize("damaged", [(22, 23), (22, 26)], ids=["two of three", "two of five"])
+def test_fewer_damaged_logs_than_agree_are_no_change(damaged: tuple[int, ...]) -> None:
+    for k in range(8):
+        y, s = weekly(k, 50)
+        y[list(damaged)] += 3.0
+        assert shifts_of(y, s, None, 52.0) == []
+
+
+def test_a_first_scale_that_is_too_small_leaves_no_log_out_for_good() -> None:
+    """Ten of twenty logs lie close together: the median deviation is theirs, the scale of the others comes back."""
+    rng = np.random.default_rng(4)
+    y = np.concatenate([np.tile([-0.004, 0.004], 7), np.tile([-0.03, 0.03], 5), 0.045 + 0.005 * rng.standard_normal(4)])
+    assert shifts_of(y, np.full(len(y), 0.001), None, 52.0) == []
 
 
 def test_outliers_are_no_change() -> None:
