@@ -1,4 +1,4 @@
-"""The benchmarks of fleets: weekly courses and a small simulated fleet."""
+"""The benchmarks of fleets: weekly courses, a small simulated fleet, and repeats of measured actuators."""
 
 from __future__ import annotations
 
@@ -10,6 +10,8 @@ import numpy as np
 import pytest
 
 from drive_rig import skip_without_library
+from gaident.fleets.found import Course
+from measured import folder
 from places import BENCH
 
 
@@ -18,10 +20,16 @@ def bench() -> Iterator[SimpleNamespace]:
     with pytest.MonkeyPatch.context() as patch:
         for place in (BENCH, BENCH / "measured", BENCH / "fleets"):
             patch.syspath_prepend(str(place))
+        import repeats
         import simulated
         import weekly
 
-        yield SimpleNamespace(simulated=simulated, weekly=weekly)
+        yield SimpleNamespace(repeats=repeats, simulated=simulated, weekly=weekly)
+
+
+def course(axis: str, values: list[float], deviation: float = 0.01) -> Course:
+    x = np.array(values)
+    return Course(axis, "inertia", "kg m^2", ("", "", ""), x, deviation * x, ("", "", ""), False, (), "only 3 usable logs")
 
 
 @pytest.mark.long
@@ -76,3 +84,30 @@ def test_a_small_simulated_fleet(bench: SimpleNamespace, tmp_path: Path, capsys:
     assert [rows[kind].found for kind in ("friction step", "belt")] == [1, 1], said
     assert sum(row.false for row in rows.values()) == 0 and "no false alarm" in said
     assert ", 0 failed" not in said and " 0 damaged" not in said
+
+
+def test_a_repeat_that_differs_is_seen_and_others_are_not(bench: SimpleNamespace) -> None:
+    near = [course(f"motor {m}", [1.0 * m, 1.02 * m, 0.99 * m]) for m in (1, 2, 3)]
+    (same,) = bench.repeats.compared([*near, course("motor 4", [4.0, 4.1, 4.05])])
+    assert len(same.values) == 12 and 0.005 < same.spread < 0.03
+    assert all(abs(v.away) < v.bound for v in same.values)
+    (odd,) = bench.repeats.compared([*near, course("motor 4", [4.0, 4.1, 6.0])])
+    assert [(v.axis, v.repeat) for v in odd.values if abs(v.away) > v.bound and v.away > 0.0] == [("motor 4", 3)]
+    assert bench.repeats.compared([course("motor 1", [1.0, 1.0, 1.0])]) == []
+
+
+@pytest.mark.long
+def test_no_change_is_told_between_repeats_of_measured_actuators(
+    bench: SimpleNamespace, data_dir: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Three logs do not show a change; none is further from its repeats than repeats of all four scatter."""
+    folder(data_dir, "joint_actuators")
+    monkeypatch.setenv("GAIDENT_DATA", str(data_dir))
+    shown = bench.repeats.followed(tmp_path)
+    assert [(len(t.axes), sum(a.logs for a in t.axes), sum(a.failed for a in t.axes)) for t in shown] == [(2, 6, 0), (2, 6, 0)]
+    assert all(t.changes == () and t.siblings == () for t in shown)
+    courses = [c for t in shown for c in t.courses]
+    assert courses and all("a change shows from 23 on" in c.poor for c in courses)
+    found = {c.quantity: c for c in bench.repeats.compared(courses)}
+    assert "inertia" in found and "dry friction" in found and len(found["inertia"].values) == 12
+    assert [(c.quantity, v) for c in found.values() for v in c.values if abs(v.away) > v.bound] == []
