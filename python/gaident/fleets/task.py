@@ -29,6 +29,7 @@ __all__ = ["METHODS", "Job", "Outcome", "FleetTask", "content_of", "lost", "perf
 
 METHODS = ("diagnose", "identify")
 HERE = "{log}"
+CHANGED = f"{HERE}: the file changed while it was read; call again when it is complete"
 """Stands for the path in a message: two logs of the same content have one result."""
 
 BLOCK = 1 << 20  # no decision: memory: bytes of a log that are read at once
@@ -124,7 +125,7 @@ def perform(task: FleetTask, job: Job) -> Outcome:
             stack.enter_context(one_thread())
             return _performed(task, job)
     except GaidentError as error:
-        return Outcome(job.log, job.key, "failed", _said(error, job))
+        return _refused(job, error)
     except MemoryError:
         return lost(job, f"{HERE}: the memory was not enough; use fewer workers, or decimate the log")
     except OSError as error:
@@ -132,6 +133,15 @@ def perform(task: FleetTask, job: Job) -> Outcome:
     except Exception as error:
         why = f"internal error, please report it: {type(error).__name__}: {_said(error, job)}"
         return Outcome(job.log, job.key, "failed", f"{HERE}: {why}")
+
+
+def _refused(job: Job, error: GaidentError) -> Outcome:
+    """What a log says that is still the one of the job fails again; one that is gone or another may be tried again."""
+    try:
+        same = content_of(job.log) == job.content
+    except OSError as gone:
+        return lost(job, f"{HERE}: cannot be read ({gone.strerror or gone}); check the file, and call again")
+    return Outcome(job.log, job.key, "failed", _said(error, job)) if same else lost(job, CHANGED)
 
 
 def _said(error: Exception, job: Job) -> str:
@@ -143,7 +153,7 @@ def _performed(task: FleetTask, job: Job) -> Outcome:
     records = _records(task, job.log)
     temperature = None if task.temperature is None else _mean_of(task, job.log)
     if content_of(job.log) != job.content:
-        return lost(job, f"{HERE}: the file changed while it was read; call again when it is complete")
+        return lost(job, CHANGED)
     given = {"controller": task.controller, "seed": task.seed, **task.more}
     whole: Callable[..., Any] = diagnose if task.method == METHODS[0] else identify
     if whole is diagnose:

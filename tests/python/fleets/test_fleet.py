@@ -10,6 +10,7 @@ import signal
 import subprocess
 import sys
 import time
+from collections.abc import Iterable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from datetime import datetime, timedelta, timezone
 from functools import partial
@@ -24,7 +25,7 @@ from gaident.cli import main
 from gaident.errors import SettingsError
 from gaident.fleets import dataset, engine
 from gaident.fleets.names import names_of
-from gaident.fleets.task import Job
+from gaident.fleets.task import Job, Outcome
 from places import ROOT
 
 fleet = importlib.import_module("gaident.fleets.fleet")
@@ -271,6 +272,30 @@ def test_without_pyarrow_the_tables_are_csv(inside: Path, monkeypatch: pytest.Mo
     rows = zip(found.rows(), fleet.kept_fleet("whole").rows(), strict=True)
     for text, binary in rows:
         assert {k: v for k, v in text.items() if v not in ("", None)} == {k: v for k, v in binary.items() if v not in ("", None)}
+
+
+def test_a_log_that_is_gone_or_another_when_it_is_read_is_tried_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    log = tmp_path / "logs" / "x" / "2026-01-01.csv"
+    write_log(log, 1)
+    whole = log.read_text()
+
+    def gone(work: object, jobs: Iterable[Job]) -> Iterator[Outcome]:
+        for job in jobs:
+            log.unlink()
+            yield work(job)  # type: ignore[operator]
+
+    def cut(work: object, jobs: Iterable[Job]) -> Iterator[Outcome]:
+        for job in jobs:
+            log.write_text(whole[:100])
+            yield work(job)  # type: ignore[operator]
+
+    for spoiled, said in ((gone, "cannot be read"), (cut, "changed while it was read")):
+        found = identified(out="out", executor=spoiled)
+        assert found.failed == 1 and said in found.first_failed()[0]
+        log.write_text(whole)
+    again = identified(out="out", executor=map)
+    assert (again.done, again.failed, again.there) == (1, 0, 0)
 
 
 def test_the_command_does_the_same(inside: Path, capsys: pytest.CaptureFixture[str]) -> None:
