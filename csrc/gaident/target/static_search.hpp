@@ -76,7 +76,7 @@ public:
         if (!begun_) begin();
         else if (next_individual_ == population) breed();
         else
-            while (n-- > 0 && next_individual_ < population) evaluate();
+            for (; n > 0 && next_individual_ < population; --n) evaluate();
         return generations_;
     }
     int generation() {

@@ -118,6 +118,8 @@ TEST_CASE("static search: slices of any size make the same run; a full record ta
         CHECK(s->full() && !s->feed(1.0, 1.0) && s->samples() == 250);
     }
     CHECK(whole->generations() == 0);
+    CHECK(sliced->work(1) == 0);  // the first population is drawn
+    for (const int n : {0, -1, std::numeric_limits<int>::min()}) CHECK(sliced->work(n) == 0);
     while (whole->generation() < 5) {
     }
     for (int n = 1; sliced->work(n) < 5;) n = n % 7 + 1;
