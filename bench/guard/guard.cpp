@@ -169,6 +169,7 @@ double effect_instructions(const EffectKernel& kernel, bool alone, const std::st
         history(4 * width);
     for (std::size_t k = 0; k < samples_with_effects; ++k) input[k] = k < 3 ? 30.0 : -20.0;
     EffectRecord record;
+    record.input = input;
     record.sample_time = Ts;
     EffectRun run;
     run.loop.kind = LoopKind::sampled;

@@ -46,6 +46,7 @@ public:
         if (s.differenced) throw std::invalid_argument("differenced: no one equation of so many poles");
         const double delay = s.delay / T, whole = std::round(delay);
         if (std::abs(delay - whole) > 1e-9) throw std::invalid_argument("delay must be a whole number of periods");
+        if (whole > max_loop_order) throw std::invalid_argument("delay: no one equation of so many poles");
 
         Polynomial torque_n{1.0}, torque_d{1.0}, velocity_n{1.0}, velocity_d{1.0}, command_n{1.0};
         command_ = {1.0};

@@ -145,6 +145,7 @@ struct PreparedFor {
     int steps;       // while a torque is held
     int per_sample;  // in a sample of the controller, or of the record in the continuous loop
     double inertia;  // of the load where there are two masses, else of the motor's side [kg m^2]
+    double torques;  // issued in the run, each held so long; infinity: it has no end
 };
 
 enum class Pace {

@@ -322,7 +322,14 @@ void prepare_effects(const EffectModel& model, const EffectRecord& record, const
     TwoMasses m{};
     out.two_masses = model.effects.needs_two_masses() || own_at_load || inertia;
     const bool load = out.two_masses && two_masses_of(model.linear, m);
-    const PreparedFor made{h, continuous ? h : Ts, continuous ? 1 : substeps, substeps, load ? m.JL : 1.0 / model.linear.gain};
+    const double samples =
+        record.input.empty() ? std::numeric_limits<double>::infinity() : static_cast<double>(record.input.size());
+    const PreparedFor made{.step = h,
+                           .hold = continuous ? h : Ts,
+                           .steps = continuous ? 1 : substeps,
+                           .per_sample = substeps,
+                           .inertia = load ? m.JL : 1.0 / model.linear.gain,
+                           .torques = continuous ? samples * substeps : samples};
     EffectConstants<double>& c = out.constants;
     c = EffectConstants<double>{};
 

@@ -8,7 +8,8 @@
 
 namespace gaident {
 
-// What a model is run against. The position is the measured one or empty; the angle then starts at `start_angle`.
+// What a model is run against; without input, a run that has no end, for who writes its recurrence down.
+// The position is the measured one or empty; the angle then starts at `start_angle`.
 struct EffectRecord {
     std::span<const double> input, position;
     std::span<const double> velocity_feedforward, torque_feedforward;  // [rad/s], [N m] of a servo, or empty

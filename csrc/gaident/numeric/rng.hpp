@@ -85,10 +85,10 @@ private:
     alignas(64) std::uint64_t words_[size];
 };
 
-// A probability as a threshold: an event of probability x happens when word() < threshold(x). 1 means always.
+// A probability as a threshold: an event of probability x happens when word() < threshold(x). 1 means always, no number never.
 constexpr std::uint64_t threshold(double probability) {
     if (probability >= 1.0) return ~0ULL;
-    if (probability <= 0.0) return 0;
+    if (!(probability > 0.0)) return 0;
     return static_cast<std::uint64_t>(probability * 0x1.0p64);
 }
 

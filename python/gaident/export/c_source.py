@@ -38,6 +38,7 @@ from gaident.version import version
 __all__ = ["c_name", "c_source", "write_c"]
 
 FINEST = 16  # no decision: substeps that the core takes at most by itself; substeps
+MOST_KEPT = 1_000_000  # no decision: what an argument may be: torques on their way, 8 MB of a drive's memory
 
 
 def write_c(
@@ -84,6 +85,13 @@ def c_source(
             f"with effects ({names}) the continuous loop is the difference of two simulations, which makes no recurrence for a "
             'controller: use PI(..., loop="sampled"), or controller=None for the drive alone'
         )
+    period = dt if servo is None else servo.period
+    for effect, (back, _) in found.get("tables", {}).items():
+        if max(back) > MOST_KEPT:
+            raise ModelError(
+                f"{effect} looks back {max(back)} torques at a sample time of {period:g} s, and a drive keeps at most {MOST_KEPT}: "
+                "give a longer sample time or a shorter delay"
+            )
     return _file(model, dt, controller, servo, name, found, axis)
 
 

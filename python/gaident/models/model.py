@@ -343,7 +343,7 @@ class Model:
         ------
         ModelError
             For user-defined effects, effects in the continuous loop, p = 0 outside it,
-            and a dt, name or substeps that are none.
+            a delay of more than a million torques, and a dt, name or substeps that are none.
         ControllerError
             For a controller with a number that is None, and a dt that is no whole multiple of its period.
         SettingsError

@@ -90,6 +90,7 @@ TEST_CASE("rng: even, in every bit and in every eighth") {
 TEST_CASE("rng: a probability as a threshold") {
     CHECK(threshold(0.0) == 0);
     CHECK(threshold(-1.0) == 0);
+    CHECK(threshold(std::nan("")) == 0);
     CHECK(threshold(0.5) == 0x8000000000000000ULL);
     CHECK(threshold(0.25) == 0x4000000000000000ULL);
     CHECK(threshold(1.0) == ~0ULL);

@@ -207,6 +207,10 @@ TEST_CASE("servo_equation: what is no linear equation is refused") {
     Loop late = bare();
     late.servo.delay = 0.5 * T;
     CHECK_THROWS(ServoEquation(late, {T, 8}, {}, Between::held), std::invalid_argument);
+    for (const double samples : {16.0, 1e6, 3e9, 1e300}) {
+        late.servo.delay = samples * T;
+        CHECK_THROWS(ServoEquation(late, {T, 8}, {}, Between::held), std::invalid_argument);
+    }
     Loop placed = bare();
     placed.servo.position_gain = 20.0;
     CHECK_THROWS(ServoEquation(placed, {T, 8}, {.acceleration = 1e-3}, Between::straight), std::invalid_argument);

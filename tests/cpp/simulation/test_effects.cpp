@@ -168,6 +168,45 @@ TEST_CASE("a held torque delayed keeps its integral, whatever the fraction of a 
         }
 }
 
+TEST_CASE("a delay beyond the run is one by the run's length, however many samples it is") {
+    for (const LoopKind kind : {LoopKind::sampled, LoopKind::open, LoopKind::continuous})
+        for (const double sample_time : {4e-10, 1e-9, 1e-3}) {
+            const std::vector<double> in(50, kind == LoopKind::open ? 0.1 : 40.0);
+            EffectJob job = job_of(in, kind);
+            job.record.sample_time = sample_time;
+            const auto delayed = [&](double by) {
+                return velocity_of(job, model_with(one_mass(), effect<TransportDelay>, {by}));
+            };
+            // The continuous loop is the linear one and the difference of two fine ones, which leaves what the bilinear rule does.
+            if (kind != LoopKind::continuous)
+                for (const double w : delayed(1.0)) CHECK(w == 0.0);
+            CHECK(delayed(1.0) == delayed(50.0 * sample_time) && delayed(1.0) == delayed(50.7 * sample_time));
+            CHECK(delayed(48.5 * sample_time).back() > 0.0);
+        }
+    // In the open loop all that acts is the torque before the record.
+    const std::vector<double> in(50, 0.1), before(50, 0.02);
+    EffectJob job = job_of(in, LoopKind::open), held = job_of(before, LoopKind::open);
+    job.record.torque_before = 0.02;
+    const std::vector<double> late = velocity_of(job, model_with(one_mass(), effect<TransportDelay>, {1.0}));
+    CHECK(most_apart(late, velocity_of(held, model_with(one_mass(), effect<TransportDelay>, {1e-16}))) <= 1e-12);
+    CHECK(late.back() > 0.1);
+}
+
+TEST_CASE("a run without an end keeps so many torques, and no more") {
+    EffectRecord record;
+    Loop open;
+    PreparedEffects made;
+    open.kind = LoopKind::open;
+    record.sample_time = 1e-9;
+    const auto prepared = [&] {
+        prepare_effects(model_with(one_mass(), effect<TransportDelay>, {1.0}), record, open, 1, nullptr, made);
+        return made.tables.of<TransportDelay>().back[0];
+    };
+    CHECK(prepared() == 1000000000);
+    record.sample_time = 4e-10;
+    CHECK_THROWS(prepared(), std::invalid_argument);
+}
+
 TEST_CASE("what is no drive gives undefined numbers and no crash") {
     const std::vector<double> r = staircase(100);
     const EffectJob job = job_of(r, LoopKind::sampled);

@@ -387,3 +387,12 @@ def test_a_step_of_torque_on_one_mass_is_an_exponential() -> None:
     expected = -6278.26 / 34.13 * np.expm1(-34.13 * time)
     assert deviation(core(case, np.ones(500))[0], expected) < 1e-13
     assert deviation(exact_simulate(case, np.ones(500))[0], expected) < 1e-14
+
+
+@pytest.mark.parametrize("dt", [4e-10, 1e-9, 1e-7])
+def test_a_delay_longer_than_the_record_keeps_its_drive_at_rest(dt: float) -> None:
+    """More than 2^31 samples of it were none, and 2^30 of them more memory than there is."""
+    late = ga.OneMass(J=1e-4, D=1e-3).model().with_effect("transport_delay", delay=1.0)
+    rec = ga.Record(dt, torque=np.ones(300), velocity=np.zeros(300))
+    assert np.all(ga.simulate(late, rec, None) == 0.0)
+    assert np.all(ga.simulate_many([late] * 3, rec, None) == 0.0)

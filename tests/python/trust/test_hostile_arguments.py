@@ -15,6 +15,7 @@ import numpy as np
 import pytest
 
 import gaident as ga
+from gaident.control import core
 from gaident.models import FactorCounts
 from gaident.models.own_effects import OWN
 
@@ -347,3 +348,12 @@ def test_sizes_beyond_all_drives_are_refused_by_name() -> None:
         ga.align(REC, {"velocity": REC.velocity}, dt=1e3)
     slow = ga.first_experiment(1e-3, ga.Limits(80.0, 2.4), inertia=1e12, kp=0.02)
     assert len(slow.command) < 50_000 and np.abs(slow.command).max() < 80.0  # ramps of an axis that no torque moves
+
+
+@pytest.mark.parametrize("period", [4e-10, 1e-5])
+def test_a_delay_of_many_periods_makes_no_one_equation(period: float) -> None:
+    """More than 2^31 of them were none; 100 000 took minutes."""
+    cascade = ga.Cascade(PI, period=period, delay=1.0)
+    began = time.perf_counter()
+    assert not core.is_one_equation(period, cascade, poles=1)
+    assert time.perf_counter() - began < 1.0

@@ -8,9 +8,14 @@
 
 #include "../effect.hpp"
 
+#include <cstdio>
+#include <stdexcept>
+#include <string>
+
 namespace gaident {
 
-inline constexpr double longest_delay = 1.0;  // s
+inline constexpr double longest_delay = 1.0;       // s
+inline constexpr double most_back = 2147483000.0;  // torques: what an int counts, with room for a fraction of one
 
 struct TransportDelay {
     static constexpr EffectParameter parameters[] = {{"delay", "s", 0.0, 0.0, longest_delay}};
@@ -32,12 +37,27 @@ struct TransportDelay {
     static bool possible(const double* p) { return p[0] >= 0.0 && p[0] <= longest_delay; }
     // A static change of the torque, as saturation and dead band are, commutes with a delay: the controller's delay adds to this one.
     static void later(double* p, double delay) { p[0] += delay; }
+    // Torques before the run are all one number: a delay beyond it is one by its length. Of longer runs a table knows `most_back`.
     static void tabulate(const double* p, const PreparedFor& time, Table& table) {
-        const double delay = possible(p) ? p[0] : 0.0;
+        const double delay = possible(p) ? p[0] : 0.0, torques = delay / time.hold;
+        const bool beyond = torques >= time.torques + 1.0;
+        if ((beyond ? time.torques : torques) > most_back) throw std::invalid_argument(too_long(delay, time.hold));
         for (int j = 0; j < time.steps; ++j) {
-            mean(delay, time.hold, j, time.steps, table.back[j], table.share[j]);
+            if (beyond) {
+                table.back[j] = static_cast<int>(time.torques);
+                table.share[j] = 0.0;
+            } else {
+                mean(delay, time.hold, j, time.steps, table.back[j], table.share[j]);
+            }
             table.younger[j] = table.back[j] > 0 ? table.back[j] - 1 : 0;
         }
+    }
+    static std::string too_long(double delay, double hold) {
+        char text[160];
+        std::snprintf(text, sizeof text,
+                      "transport_delay: a delay of %g s is %.0f torques of %g s, more than the %.0f that are kept", delay,
+                      delay / hold, hold, most_back);
+        return text;
     }
     static int reach(const Table& table, int steps) {
         int back = 0;
@@ -45,7 +65,7 @@ struct TransportDelay {
         return back;
     }
 
-    // For substep j of m: `back` = -k counted from the present value, `share` = v.
+    // For substep j of m: `back` = -k counted from the present value, `share` = v. At most `most_back` torques.
     static void mean(double delay, double hold, int j, int m, int& back, double& share) {
         const double x = static_cast<double>(j) / m - delay / hold;
         int k = static_cast<int>(x);
