@@ -41,12 +41,12 @@ py::tuple simulate_model(double gain, const ComplexArray& poles, const ComplexAr
     const std::span<double> u{torque.mutable_data(), static_cast<std::size_t>(input.size())};
     const std::span<const double> in = view(input);
     const double* const start = initial_state.size() == 0 ? nullptr : initial_state.data();
-    {
-        const ReleasedGil released;
-        if (arithmetic == "double") simulate<double>(g, in, clock.period, loop, start, w, u);
-        else if (arithmetic == "float") simulate_in_float(g, in, clock.period, loop, start, w, u);
+    std::atomic<bool> stop{false};
+    run_interruptibly(stop, in.size(), [&] {
+        if (arithmetic == "double") simulate<double>(g, in, clock.period, loop, start, w, u, &stop);
+        else if (arithmetic == "float") simulate_in_float(g, in, clock.period, loop, start, w, u, &stop);
         else simulate_mirrored(g, in, clock, loop, start, arithmetic, w, u);
-    }
+    });
     return py::make_tuple(velocity, torque);
 }
 

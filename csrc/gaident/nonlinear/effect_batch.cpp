@@ -55,7 +55,7 @@ public:
     void run() {
         parallel(groups_.size(), job_.own != nullptr ? 1 : job_.workers, [&](std::size_t i) {
             const FlushDenormals flush;
-            if (job_.stop != nullptr && *job_.stop) throw Stopped{};
+            stop_if_asked(job_.stop);
             const std::span<const std::size_t> group(&order_[groups_[i].first], groups_[i].second - groups_[i].first);
             const Planned& first = planned_[group[0]];
             if (first.substeps == 0 || job_.loop.kind == LoopKind::continuous) linear(group);
@@ -82,7 +82,7 @@ private:
         std::vector<double> unwanted(out_.torque == nullptr ? samples_ : 0);
         double* const torque = out_.torque == nullptr ? unwanted.data() : row(out_.torque, i);
         simulate<double>(p.model.linear, job_.record.input, job_.record.sample_time, job_.loop, p.start,
-                         {row(out_.velocity, i), samples_}, {torque, samples_});
+                         {row(out_.velocity, i), samples_}, {torque, samples_}, job_.stop);
     }
 
     void linear(std::span<const std::size_t> group) {

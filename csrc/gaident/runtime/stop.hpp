@@ -2,8 +2,12 @@
 #pragma once
 
 #include <atomic>
+#include <cstddef>
 
 namespace gaident {
+
+// Samples of one linear simulation between two looks at the flag: some milliseconds in the slowest arithmetic.
+inline constexpr std::size_t samples_between_stops = 8192;
 
 // Thrown where the flag is seen; the caller asked for it.
 struct Stopped {};

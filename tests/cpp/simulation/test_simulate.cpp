@@ -48,6 +48,41 @@ TEST_CASE("simulate: a record cut in two goes on from the state where it was cut
     for (std::size_t i = 0; i < 180; ++i) CHECK(rest[i] == w[120 + i]);
 }
 
+TEST_CASE("simulate: a long record, run in parts, is that of one run, and ends where it is asked to") {
+    const std::size_t n = 2 * samples_between_stops + 77;
+    for (const LoopKind kind : {LoopKind::continuous, LoopKind::sampled, LoopKind::open})
+        for (const bool limited : {false, true}) {
+            auto d = reference::paper_drive(true);
+            d.loop.kind = kind;
+            if (limited && kind != LoopKind::open) d.loop.controller.torque_limit = 0.05;
+            Random random(103);
+            const std::vector<double> input = reference::random_signal(random, n);
+            std::vector<double> w(n), u(n), whole(n), torque(n);
+            simulate<double>(d.factors(), input, d.sample_time, d.loop, nullptr, w, u);
+            Record record;
+            record.input = record.output = input;
+            record.sample_time = d.sample_time;
+            const Prepared c = prepare(d.factors(), record, d.loop, nullptr);
+            AloneRun<double> run{kind, d.loop.limited(), c.response.order, {}, {}, {}, {d.loop.controller, Clock{d.sample_time}}};
+            std::copy(c.response.a, c.response.a + run.order, run.a);
+            std::copy(c.response.b, c.response.b + run.order + 1, run.b);
+            best_kernels().in_double.alone(run, input.data(), n, whole.data(), torque.data());
+            CHECK(w == whole && u == torque);
+            for (const bool asked : {false, true}) {
+                const std::atomic<bool> stop{asked};
+                const auto again = [&] { simulate<double>(d.factors(), input, d.sample_time, d.loop, nullptr, w, u, &stop); };
+                const auto in_float = [&] { simulate_in_float(d.factors(), input, d.sample_time, d.loop, nullptr, w, u, &stop); };
+                if (asked) {
+                    CHECK_THROWS(again(), Stopped);
+                    CHECK_THROWS(in_float(), Stopped);
+                } else {
+                    again();
+                    CHECK(w == whole);
+                }
+            }
+        }
+}
+
 TEST_CASE("simulate: Table V from Table IV in powers of z") {
     const auto check = [](bool two_mass, std::vector<double> alpha, std::vector<double> beta, double tolerance) {
         const auto d = reference::paper_drive(two_mass);

@@ -21,10 +21,16 @@ drive, pi = ga.TwoMass(JM=1.02e-4, DM=0.003, JL=5.815e-4, DL=0.008, KG=2.59).mod
 command = np.repeat(np.random.default_rng(0).uniform(-50.0, 50.0, n // 1000), 1000)
 rec = ga.Record(1e-3, command=command, velocity=np.zeros(n))
 rough = drive.with_effect("coulomb_friction", torque=0.02)
+
+def one_record(samples):  # the slowest without effects: in pairs of floats, 5 s
+    record = ga.Record(1e-3, command=np.resize(command, samples), velocity=np.zeros(samples))
+    return lambda: ga.simulate(drive, record, ga.PI(0.02, 0.6, torque_limit=0.1), arithmetic="float")
+
 work = {
-    "simulate_many": lambda: ga.simulate_many([drive] * 1000, rec, pi),
-    "with effects": lambda: ga.simulate_many([rough] * 1000, rec, pi),
-}[sys.argv[1]]
+    "simulate": lambda: one_record(30_000_000),
+    "simulate_many": lambda: lambda: ga.simulate_many([drive] * 1000, rec, pi),
+    "with effects": lambda: lambda: ga.simulate_many([rough] * 1000, rec, pi),
+}[sys.argv[1]]()
 sent = []
 
 def interrupt():
@@ -40,7 +46,7 @@ except KeyboardInterrupt:
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="a process cannot send itself Ctrl-C there")
-@pytest.mark.parametrize("kind", ["simulate_many", "with effects"])
+@pytest.mark.parametrize("kind", ["simulate_many", "with effects", pytest.param("simulate", marks=pytest.mark.long)])
 def test_ctrl_c_within_a_second_where_the_core_works(kind: str) -> None:
     done = subprocess.run([sys.executable, "-c", WORK, kind], capture_output=True, text=True, timeout=120)
     assert done.stderr == ""

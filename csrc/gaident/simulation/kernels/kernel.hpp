@@ -301,6 +301,8 @@ struct KernelSource {
         run.controller.s = One::all(c.s);
         run_alone(
             run, input, n, [](double x) { return One(x); }, [](One x) { return static_cast<double>(x.v); }, velocity, torque);
+        for (int i = 0; i < run.order; ++i) given.x[i] = run.x[i].v;
+        given.controller.s = run.controller.s.v;
     }
 
     template <class T, int W>
