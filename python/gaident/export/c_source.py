@@ -89,8 +89,8 @@ def c_source(
     for effect, (back, _) in found.get("tables", {}).items():
         if max(back) > MOST_KEPT:
             raise ModelError(
-                f"{effect} looks back {max(back)} torques at a sample time of {period:g} s, and a drive keeps at most {MOST_KEPT}: "
-                "give a longer sample time or a shorter delay"
+                f"{effect} looks back {max(back)} torques at a sample time of {period:g} s, and a drive keeps at most "
+                f"{MOST_KEPT}: give a longer sample time or a shorter delay"
             )
     return _file(model, dt, controller, servo, name, found, axis)
 

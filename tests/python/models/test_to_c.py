@@ -148,7 +148,7 @@ def test_what_c_refuses() -> None:
 def test_a_delay_of_more_torques_than_a_drive_keeps_is_refused() -> None:
     """At 4e-10 s a second was written as no delay at all."""
     late = ONE.with_effect("transport_delay", delay=1.0)
-    with pytest.raises(ModelError, match=r"transport_delay looks back 10000000 torques at dt=1e-07 s.*at most 1000000"):
+    with pytest.raises(ModelError, match=r"looks back 10000000 torques at a sample time of 1e-07 s.*at most 1000000"):
         late.to_c(None, 1e-7)
     with pytest.raises(ModelError, match=r"transport_delay: a delay of 1 s is 2500000000 torques of 4e-10 s"):
         late.to_c(None, 4e-10)
