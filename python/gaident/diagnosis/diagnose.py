@@ -50,6 +50,10 @@ IDENTIFIED_AGAIN = say(
     "The given identification is not of the controller that explains these records: another one, under that controller, is in "
     "its place."
 )
+LOOP_MAKES = say(
+    "The measured {torque}, which is not known between the lines of the log, leaves something where it drives the model alone; "
+    "that which the controller makes behind its filter leaves nothing: it drives the model."
+)
 FIRST_CAUSE = Text(
     "This was the quick search, which stops at the first cause: whether there is another one was not looked for, and another one "
     "would change these values. The whole search tells."
@@ -255,6 +259,7 @@ def diagnose(
                 looped = under_best_controller(driving.by_loop, most, None)
                 if looped.found.driver is None:
                     work, found, discarded = looped
+                    discarded.append(LOOP_MAKES)
             if found.causes or found.driver is None:
                 break
             linear = linear if work.driving.regained_from is not None else work.idn  # a name needs more than one effect here

@@ -283,33 +283,32 @@ def _moved_by_torque_noise(model: Model, scored: Sequence[tuple[Record, int]]) -
 
 
 def start_state(model: Model, rec: Record, controller: Controller | None, read: Controller | None = None) -> Vector | None:
-    """Initial state of the model at the record's start; None where it starts from rest, or moves and the loop has limits.
+    """Initial state of the model at the record's start, and of its controller behind it; None where it starts from rest.
 
-    The logged torque shows what the integrator held, at rest for a load, and drives the mechanism over the head of a record that
-    begins in motion.
-    In motion a model with effects is not linear in its state: two steps of Gauss and Newton over the record's head,
-    from the first velocity.
+    At rest the integral may be a load's torque, which the logged torque shows.
+    In motion a bare PI and a linear model have the state with which the whole record comes closest.
+    Any other is not linear in its state: two steps of Gauss and Newton over the record's head, from the first velocity.
     """
     loop = read or controller
-    pi = bare_pi(loop)
-    if controller is not None and loop is not None and (stored := stored_torque(rec, loop)):
-        moved = start_state(model, rec, None, loop) if starts_moving(rec, pi) else None
-        return np.append(np.zeros(model.mechanism.order) if moved is None else moved, stored)
-    if controller is None and not starts_moving(rec, pi):
-        before = torque_before(rec, load_before(rec, read))
-        return np.append(np.zeros(model.mechanism.order), before) if before else None
-    if not starts_moving(rec, pi) or (controller is not None and (controller.limited or model.effects)):
-        return None
-    if not model.effects:
+    pi, order = bare_pi(loop), model.mechanism.order
+    stored = 0.0 if controller is None or loop is None else stored_torque(rec, loop)
+    if not starts_moving(rec, pi):
+        before = torque_before(rec, load_before(rec, read)) if controller is None else stored
+        return np.append(np.zeros(order), before) if before else None
+    closed = bare_pi(controller)
+    if not model.effects and (controller is None or (closed is not None and not closed.limited)):
         return np.asarray(initial_state(model, rec, controller))
     head = rec[: min(len(rec), POLICY.head)]
-    state = np.zeros(model.mechanism.order)
+    state = np.zeros(order if controller is None else order + 1)
     state[0] = rec.velocity[0]
-    step = 1e-3 * float(np.abs(head.velocity).max())
+    steps = np.full(len(state), 1e-3 * float(np.abs(head.velocity).max()))
+    if controller is not None:
+        state[-1] = stored
+        steps[-1] *= controller.gains.kp or 1.0
     for _ in range(2):
         with np.errstate(over="ignore", invalid="ignore"):
-            here = simulate(model, head, None, state)
-            slopes = np.array([simulate(model, head, None, state + d) - here for d in step * np.eye(len(state))]) / step
+            here = simulate(model, head, controller, state)
+            slopes = np.array([simulate(model, head, controller, state + d) - here for d in np.diag(steps)]) / steps[:, None]
         if not (np.all(np.isfinite(here)) and np.all(np.isfinite(slopes))):
             break
         state = state + np.linalg.lstsq(slopes.T, head.velocity - here, rcond=1e-9)[0]

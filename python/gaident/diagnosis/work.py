@@ -253,7 +253,7 @@ class Work:
             model = self._made(self.estimate.x)
             check = by_second_method(self.data, gains, model, mechanics, estimates)
             unnamed = len(causes) < len(self.final.effects)  # an effect describes what has no name
-            causes, why = standing(causes, gains, check, self._equivalent_here)
+            causes, why = standing(causes, gains, check, self._equivalent_here, mechanics.get("inertia"))
             if why or check.loses or unnamed:
                 driver = driver or self.left.strongest or "time"
                 self.notes += why

@@ -221,8 +221,8 @@ class _Fit:
         self.used = self.stretch >= 0
         if np.sum(self.used) < POLICY.least_samples:
             raise RecordError(
-                f"{unknown[0]} of the controller is None, not known, and the torque is at its limit in all but "
-                f"{int(np.sum(self.used))} lines: log a motion that asks for less, or give the number"
+                f"{unknown[0]} of the controller is None, not known, and the torque is at its limit, or the record only "
+                f"begins, in all but {int(np.sum(self.used))} lines: log a longer motion, which asks for less, or give the number"
             )
 
     def solved(self, start: Vector | None = None) -> _Solved:

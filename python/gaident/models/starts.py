@@ -73,9 +73,10 @@ def starts_moving(rec: Record, controller: Controller | None) -> bool:
     In the continuous loop a command at sample 0 passes through at once,
     so a first velocity between 0 and 0.6 of that command is no motion.
     A record whose input never changes counts as started at rest by a step at sample 0: with an unknown state before it, the
-    record would say nothing about zeros and gain (see `doubtful_start`). No step at sample 0 makes 0.6 of the top speed at once.
+    record would say nothing about zeros and gain (see `doubtful_start`).
+    No step at sample 0 makes 0.6 of the usual speed at once.
     """
-    return _first_is_motion(rec, controller) and not (_constant_input(rec, controller) and _may_be_a_step(rec))
+    return _first_is_motion(rec, controller) and not _taken_for_a_step(rec, controller)
 
 
 def torque_before(rec: Record, stored: float = 0.0) -> float:
@@ -87,7 +88,7 @@ def torque_before(rec: Record, stored: float = 0.0) -> float:
     if rec.torque is None:
         return 0.0
     first, rest = np.abs(rec.velocity[: POLICY.held_samples]), _rest(rec)
-    if first[0] > rest and not (_constant_input(rec, None) and _may_be_a_step(rec)):  # `starts_moving`, of an open loop
+    if first[0] > rest and not _taken_for_a_step(rec, None):  # `starts_moving`, of an open loop
         return float(rec.torque[0])
     if stored:
         return stored
@@ -107,7 +108,7 @@ def constant_beside(off: NDArray[np.float64], size: float) -> float:
 
 def doubtful_start(rec: Record, controller: Controller | None) -> Text | None:
     """A sentence where a record's input is constant and its first velocity is not that of rest."""
-    if not (_constant_input(rec, controller) and _first_is_motion(rec, controller) and _may_be_a_step(rec)):
+    if not (_taken_for_a_step(rec, controller) and _first_is_motion(rec, controller)):
         return None
     name = f"Record {rec.name}" if rec.name else "The record"
     return say(
@@ -123,9 +124,10 @@ def _constant_input(rec: Record, controller: Controller | None) -> bool:
     return source is not None and bool(np.all(source == source[0]))
 
 
-def _may_be_a_step(rec: Record) -> bool:
-    """Whether the axis may have begun to move at the first sample, by its velocity there."""
-    return abs(float(rec.velocity[0])) <= POLICY.rest_share * float(np.abs(rec.velocity).max())
+def _taken_for_a_step(rec: Record, controller: Controller | None) -> bool:
+    """Whether the input never changes and the axis may have begun to move at the first sample, by its velocity there."""
+    held = POLICY.held_share * float(np.median(np.abs(rec.velocity)))
+    return _constant_input(rec, controller) and abs(float(rec.velocity[0])) <= max(held, _rest(rec))
 
 
 def _first_is_motion(rec: Record, controller: Controller | None) -> bool:

@@ -10,8 +10,11 @@ import pytest
 import gaident as ga
 from drive_rig import Noise, Plant, rig
 from gaident.diagnosis.controller.forms import form_shown
+from gaident.diagnosis.gains import start_state
 from gaident.identification.controller_numbers import with_estimates
+from gaident.models import simulate
 from gaident.models.drive_torque import driven_by
+from gaident.models.starts import starts_moving
 from referee_logs import GIVEN, KI, KP, T, command, low, slower
 
 CLOCK = ga.Cascade(GIVEN, T)
@@ -77,3 +80,26 @@ def test_a_resonance_is_found_where_it_is() -> None:
     dia = ga.diagnose(slower(4)[SKIPPED:], CLOCK, seed=1)
     assert dia.verdict == "adequate"
     assert dia.mechanics["resonance"].value == pytest.approx(74.1, rel=5e-3)
+
+
+@pytest.mark.parametrize("effect", [{}, {"coulomb_friction": {"torque": 0.1}}])
+@pytest.mark.parametrize("limit", [None, 5.0])
+@pytest.mark.parametrize("logged", [True, False])
+def test_a_free_run_of_a_record_in_motion_begins_at_its_velocity(
+    effect: dict[str, dict[str, float]], limit: float | None, logged: bool
+) -> None:
+    """Of the linear model too, whatever it lacks: dry friction, and a load that the integrator holds."""
+    pi, linear = ga.PI(0.03, 1.0, torque_limit=limit), ga.OneMass(J=3e-4, D=2e-3).model()
+    drive = linear.with_effect("coulomb_friction", torque=0.1).with_effect("load_torque", torque=0.3)
+    noise = 0.02 * np.random.default_rng(1).standard_normal(900)
+    command = np.repeat([40.0, 20.0, 40.0, 10.0, 30.0, 20.0], 150)
+    done = ga.run(drive, ga.Record(1e-3, command=command - noise, velocity=noise), pi)
+    rec = ga.Record(1e-3, command=command, velocity=done.velocity + noise, torque=done.torque if logged else None)[120:]
+    assert starts_moving(rec, pi)
+    model = linear
+    for name, values in effect.items():
+        model = model.with_effect(name, **values)
+    state = start_state(model, rec, pi)
+    assert state is not None and len(state) == 2
+    run = simulate(model, rec, pi, state)
+    assert abs(run[0] - rec.velocity[0]) < 1.0 and np.max(np.abs(run - rec.velocity)[:25]) < 3.0

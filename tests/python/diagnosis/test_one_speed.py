@@ -131,6 +131,22 @@ def test_a_record_that_holds_one_speed_has_nothing_wrong(effects: dict[str, dict
 
 
 @pytest.mark.long
+def test_without_a_torque_and_a_change_of_speed_nothing_is_named() -> None:
+    """A limit that does not act is no reason to begin a free run at rest; a ripple of an axis that nothing moves is no cause."""
+    skip_without_library()
+    command = np.append(np.zeros(20), np.full(700, 40.0))
+    clean, cogging = (
+        rig(AXIS, command, effects, Noise(white=0.05), seed=3, torque_logged=False)[200:]
+        for effects in ({}, {"cogging": TORQUES["cogging"]})
+    )
+    dia = ga.diagnose(clean, ga.PI(AXIS.kp, AXIS.ki, torque_limit=0.6))
+    assert dia.verdict == "adequate" and dia.after.rmse == pytest.approx(0.05, rel=0.1), dia.summary()
+    dia = ga.diagnose(cogging, ga.PI(AXIS.kp, AXIS.ki))
+    assert not dia.causes and dia.verdict == "unexplained", dia.summary()
+    assert any("do not show what the torque does to this axis" in note for note in dia.notes)
+
+
+@pytest.mark.long
 @pytest.mark.parametrize("name", list(TORQUES))
 def test_a_hum_and_a_cogging_of_one_held_speed_are_one_class_and_an_experiment_separates_them(name: str) -> None:
     assert [(f.effect, f.alternatives) for f in at_one_speed({name: TORQUES[name]}, 0).causes] == [(name, ())]  # the run up

@@ -12,6 +12,7 @@ import gaident as ga
 from drive_rig import Plant
 from gaident.diagnosis.controller.form_findings import loop_of
 from gaident.diagnosis.controller.other_form import other_scheme
+from gaident.diagnosis.diagnose import _Prepared
 from gaident.identification.replay.integral_schemes import scheme_shown
 from loop_cases import BAND, DECAY, PERIOD, scheme_log
 
@@ -50,6 +51,19 @@ def test_a_decay_is_told_from_an_integral_that_is_held() -> None:
     assert shown is not None and shown.closer and abs(shown.scheme.number - DECAY) < 4.0 * shown.std
     limit = float(np.abs(log("hold").torque).max())
     assert scheme_shown([log("hold")], replace(held, velocity=replace(held.velocity, torque_limit=limit))) is None
+
+
+def test_numbers_that_were_not_given_stay_beside_a_decay_and_the_rule_that_was_is_no_finding() -> None:
+    limit = float(np.abs(log("decay").torque).max())
+    held = replace(GIVEN, velocity=ga.PI(None, 2.0, rule="forward", torque_limit=limit, anti_windup="hold"))
+    driving = _Prepared.of(loop_of([log("decay")], held), [log("decay")], []).driving()
+    assert [f.effect for f in driving.findings] == ["anti_windup"] and "kept" in driving.findings[0].parameters
+    assert driving.numbers["velocity.kp"].value == pytest.approx(0.03, rel=1e-3)
+
+
+def test_where_no_limit_is_reached_no_decay_is_looked_for() -> None:
+    held = replace(GIVEN, velocity=replace(GIVEN.velocity, torque_limit=50.0, anti_windup="hold"))
+    assert scheme_shown([log("")], held) is None
 
 
 def test_a_clamp_of_integral_and_output_alike() -> None:

@@ -18,7 +18,7 @@ from gaident.control.unknown import field_of
 from gaident.data.record import Record
 from gaident.data.torque_kind import MEASURED
 from gaident.diagnosis.controller.controller_place import AsLogged, as_logged
-from gaident.diagnosis.controller.form_findings import Loop, driver_of
+from gaident.diagnosis.controller.form_findings import Driver, Loop, driver_of
 from gaident.diagnosis.controller.limit_not_given import by_a_limit
 from gaident.diagnosis.controller.log_shift import Aligned, aligned
 from gaident.diagnosis.controller.measured_lag import Lag, behind_a_lag, commanded, lag_shown
@@ -208,9 +208,9 @@ def driving_of(
     here, there = ([origin.get(r.digest, r) for r in part] for part in (records, validation))
     if slower and (not doubts if form is None else form.simulated):
         assert controller is not None
-        shown = (controller, findings, ()) if form is None else (form.controller, form.findings, form.notes)
-        law = other_scheme(here, there, *shown[:2])
-        form = form if law is None else replace(law, notes=(*shown[2], *law.notes))
+        formed = form or Driver((), (), cascade_of(controller), findings, (), numbers)
+        law = other_scheme(here, there, formed.controller, formed.findings)
+        form = form if law is None else replace(law, notes=(*formed.notes, *law.notes), estimates=formed.estimates)
     if slower and form is None and not asked.findings:
         assert controller is not None
         if (lagging := behind_a_lag(here, there, controller)) is not None:

@@ -18,22 +18,29 @@ So do all causes where the free run is worse and the force error smaller: under 
 drifts by what is small in every sample.
 Both are said in a note, and what stands so is not all that there is: the diagnosis is "partly explained" at best.
 Figures of the samples that were fitted take no name, but where the free run is worse even there, the same holds.
+A model whose inertia may be any explains nothing: no torque moves its axis, and what would be one cause looks like another.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Collection, Sequence
 
-from gaident.axis import Text, joined, say
+from gaident.axis import Text, called, joined, say
 from gaident.diagnosis.check import Check
 from gaident.diagnosis.gains import Gains
 from gaident.diagnosis.library.sides import called_of, name_of
 from gaident.diagnosis.library.terms import LIBRARY, of_inverse_dynamics
 from gaident.policy.table import POLICY
+from gaident.results.estimate import Estimate
 
 __all__ = ["standing"]
 
 
+NOTHING_MOVES_IT = (
+    "With {} in the model its {inertia} may be any: the records do not show what the {torque} does to this axis, and so no cause "
+    "is named. Log the {torque}, and a motion that changes its speed."
+)
 IN_SAMPLE_WORSE = (
     "Even on the samples that were fitted the free run of the extended model is worse than that of the linear model ({:.3g} to "
     "{:.3g} {rad/s}, beyond its variation over the record): what it names is not all that there is."
@@ -41,14 +48,16 @@ IN_SAMPLE_WORSE = (
 
 
 def standing(
-    causes: Sequence[str], gains: Gains, check: Check, same: Callable[[str], Collection[str]]
+    causes: Sequence[str], gains: Gains, check: Check, same: Callable[[str], Collection[str]], inertia: Estimate | None = None
 ) -> tuple[list[str], tuple[Text, ...]]:
     """(the causes that the held-out data leave, what is said where they speak against the model or one of its figures).
 
-    same: effect -> what these records cannot tell from it.
+    same: effect -> what these records cannot tell from it. inertia: of the model; None where it has none.
     """
     if not causes:
         return [], ()
+    if inertia is not None and not math.isfinite(inertia.std):
+        return [], (say(NOTHING_MOVES_IT, joined(" and ", map(called, causes))),)
     low, high = gains.interval
     worse = high < 0.0 and gains.before.rmse < (1.0 - POLICY.harm) * gains.after.rmse
     if gains.in_sample:

@@ -164,6 +164,8 @@ def scheme_shown(records: Sequence[Record], controller: Cascade) -> SchemeShown 
         pi = replace(pi, torque_limit=plateau if np.isfinite(plateau) else None)
         bare = replace(bare, velocity=pi)
     logs = [_log_of(r, bare) for r in records]
+    if closer and max(float(np.abs(log.torque).max()) for log in logs) < POLICY.at_limit * pi.limits[0]:
+        return None
     at_limit = [] if pi.torque_limit is None else [replace(pi, anti_windup="hold")]
     known = [controller, bare, *(replace(bare, velocity=one) for one in at_limit)]
     before = min(_rms([log.torque - log.made(one) for log in logs]) for one in known)
@@ -172,7 +174,9 @@ def scheme_shown(records: Sequence[Record], controller: Cascade) -> SchemeShown 
     if found is None:
         return None
     left, scheme = found
-    for rule in [rule for rule in RULES if rule != pi.rule]:
+    if closer and not left < before:
+        return None
+    for rule in [] if closer else [rule for rule in RULES if rule != pi.rule]:  # the torques follow with the one that is given
         other = replace(bare, velocity=replace(pi, rule=rule))
         again = _fitted(logs, scheme.kind, scheme.variant, other)
         if again[0] < POLICY.each_number * left:
