@@ -46,6 +46,7 @@ __all__ = [
 
 Vector = NDArray[np.float64]
 
+STATE_STEP = 1e-3  # no decision: the step of a difference, of the largest velocity
 NOISES = 8  # no decision: draws of a torque's noise, how closely the floor of a free run is known
 
 
@@ -301,7 +302,7 @@ def start_state(model: Model, rec: Record, controller: Controller | None, read: 
     head = rec[: min(len(rec), POLICY.head)]
     state = np.zeros(order if controller is None else order + 1)
     state[0] = rec.velocity[0]
-    steps = np.full(len(state), 1e-3 * float(np.abs(head.velocity).max()))
+    steps = np.full(len(state), STATE_STEP * float(np.abs(head.velocity).max()))
     if controller is not None:
         state[-1] = stored
         steps[-1] *= controller.gains.kp or 1.0

@@ -25,6 +25,7 @@ _PICK = re.compile(r"(.+)\[\s*(:|-?\d+)\s*,\s*(:|-?\d+)\s*\]")
 _LISTED = 40  # no decision: how many columns a message names
 MOST_COLUMNS = 100_000  # no decision: what an argument may be: columns of a log
 LONGEST_NAME = 10_000  # no decision: what an argument may be: characters of a column's name
+SHOWN_NAME = 20  # no decision: printed: letters of a name that is too long
 
 
 def first_line(error: BaseException) -> str:
@@ -130,8 +131,9 @@ class LogTable:
         for k, column in enumerate(self.columns):
             if len(column.key) > LONGEST_NAME:
                 raise ReadError(
-                    f"{self.path}: the name of column #{k} is {len(column.key)} characters long ({column.key[:20]!r}...), and at "
-                    f"most {LONGEST_NAME} are read; a quotation mark may lack its end, or the rows may stand in one line"
+                    f"{self.path}: the name of column #{k} is {len(column.key)} characters long "
+                    f"({column.key[:SHOWN_NAME]!r}...), and at most {LONGEST_NAME} are read; "
+                    "a quotation mark may lack its end, or the rows may stand in one line"
                 )
         return self
 
