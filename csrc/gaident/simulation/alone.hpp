@@ -28,6 +28,7 @@ template <class R>
             velocity[k] = value(stepped.step(run.order, run.a, run.b, run.x, number(input[k]), u));
             torque[k] = value(u);
         }
+        run.controller = stepped.pi;
         return;
     }
     for (std::size_t k = 0; k < n; ++k) {
