@@ -126,8 +126,10 @@ def _constant_input(rec: Record, controller: Controller | None) -> bool:
 
 def _taken_for_a_step(rec: Record, controller: Controller | None) -> bool:
     """Whether the input never changes and the axis may have begun to move at the first sample, by its velocity there."""
+    if not _constant_input(rec, controller):
+        return False
     held = POLICY.held_share * float(np.median(np.abs(rec.velocity)))
-    return _constant_input(rec, controller) and abs(float(rec.velocity[0])) <= max(held, _rest(rec))
+    return abs(float(rec.velocity[0])) <= max(held, _rest(rec))
 
 
 def _first_is_motion(rec: Record, controller: Controller | None) -> bool:
