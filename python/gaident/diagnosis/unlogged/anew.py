@@ -34,14 +34,17 @@ ZEROS = (2, 3)  # no decision: a formula: of two masses, q, and one pole and zer
 
 
 def mechanisms_under(space: ModelSpace, scales: Scales, objective: Objective, data: DataSet) -> list[Fit]:
-    """One mass and two, with the usual effects where they are worth it, fitted to the raw errors of data; [] where none fits."""
+    """One mass and two, fitted to the raw errors of data; [] where none fits.
+
+    One mass has the usual effects where they are worth it, and its shaft has them then.
+    """
     one = _short(scales, objective, data, balanced(data))
     if not one.cost < WORST:
         return []
     usual = with_usual_effects(space, objective, one)
     bases = [one, usual] if usual.effects else [one]
-    found = [fit for base in bases for fit in _on_a_shaft(objective, base)] + _identified(scales, objective, data)
-    return [usual, *(with_usual_effects(space, objective, fit) for fit in found)]
+    shafts = [fit for base in bases for fit in _on_a_shaft(objective, base)]
+    return [usual, *(ls.scored(objective, fit) for fit in shafts + _identified(scales, objective, data))]
 
 
 def _identified(scales: Scales, objective: Objective, data: DataSet) -> list[Fit]:

@@ -31,6 +31,7 @@ from gaident.diagnosis.unlogged.anew import dry_friction, mechanisms_under, with
 from gaident.diagnosis.unlogged.controller_forms import VARIANTS, ControllerForm
 from gaident.diagnosis.unlogged.other_gains import OTHER_GAINS
 from gaident.diagnosis.unlogged.under_controller import UnderController, out_of_reach
+from gaident.estimation import least_squares as ls
 from gaident.estimation.criterion import cost_of
 from gaident.estimation.noise_model import WHITE
 from gaident.estimation.objective import Fit, Objective
@@ -101,10 +102,12 @@ def unlogged_form(space: Moves, final: Fit, doubtful: bool = False) -> UnloggedF
             for v, under, base, z in starts
             for friction in dry_friction(space, base)
         ]
-    starts += [(form, under, fit, z) for form in VARIANTS for under, fit, z in _anew(space, objective, final, form)]
     beyond = max(out_of_reach(space, f) for f in (final, _opened(space, final)))
-    known = _ends(space, objective, beyond, starts)
-    known += _ends(space, objective, beyond, _once_more(space, objective, data.pi, known))
+    known = _ends(space, objective, beyond, starts, [])
+    if not any(_explains(space, end[0]) for end in known):
+        starts = [(form, under, fit, z) for form in VARIANTS for under, fit, z in _anew(space, objective, final, form)]
+        known = _ends(space, objective, beyond, starts, known)
+    known = _ends(space, objective, beyond, _once_more(space, objective, data.pi, known), known)
     best = min(known, key=lambda f: f[1], default=None)
     if best is None or any(f[2].finding == OTHER_GAINS and f[1] < best[1] + space.margin for f in known):
         return None
@@ -114,6 +117,15 @@ def unlogged_form(space: Moves, final: Fit, doubtful: bool = False) -> UnloggedF
     close = {f[2]: f[2].words for f in known if f[1] < score + space.margin and f[2].finding != variant.finding}
     finding = _finding(variant, z, stds, selected - score, list(close.values()))
     return UnloggedForm(fit, variant.of(data.pi, z), variant.words, finding, score, selected, numbers)
+
+
+def _explains(space: Moves, fit: Fit) -> bool:
+    """Whether one mass under another controller leaves noise, without an effect in series that a form may stand for.
+
+    Two masses that leave noise are not enough: another form, on a mechanism that is found anew, may be better by the criterion.
+    """
+    there = replace(space, objective=replace(space.objective, data=fit.predictor.data))
+    return fit.parameters.masses == 1 and leaves_noise(there, fit) and not in_series(fit)
 
 
 def leaves_noise(space: Moves, fit: Fit) -> bool:
@@ -183,12 +195,31 @@ def _anew(space: Moves, objective: Objective, final: Fit, form: ControllerForm) 
         for fit in mechanisms_under(space, final.parameters.scales, objective, under.over(z))
     ]
     best = sorted(found, key=lambda one: space.score(one[1]))
-    return [one for n in (1, 2) for one in [f for f in best if f[1].parameters.masses == n][: POLICY.starts]]
+    kept = [one for n in (1, 2) for one in [f for f in best if f[1].parameters.masses == n][: POLICY.starts]]
+    return [(under, with_usual_effects(space, objective, fit), z) for under, fit, z in kept]
 
 
-def _ends(space: Moves, objective: Objective, beyond: float, starts: Sequence[_Start]) -> list[_End]:
-    found = (_fitted(space, objective, beyond, *start) for start in starts)
-    return [end for end in found if end is not None]
+def _ends(space: Moves, objective: Objective, beyond: float, starts: Sequence[_Start], known: list[_End]) -> list[_End]:
+    """The known ends, and those of the starts, the best start first.
+
+    A start is not followed where it stays further behind the best end than a beam reaches, or beyond.
+    """
+    reach, ends = POLICY.beam_reach * space.penalty, list(known)
+    for start in _begun(space, objective, starts):
+        nearest = min((space.score(end[0]) + reach for end in ends), default=beyond)
+        end = _fitted(space, objective, min(beyond, nearest), *start)
+        ends += [end] if end is not None else []
+    return ends
+
+
+def _begun(space: Moves, objective: Objective, starts: Sequence[_Start]) -> list[_Start]:
+    """The starts with their models fitted under their controllers, the best first; of equal ones the first."""
+    begun: dict[tuple[object, ...], _Start] = {}
+    for form, under, base, z in starts:
+        hypothesis = under.of(base.hypothesis, z)
+        fit = ls.scored(objective, ls.fit(objective, hypothesis, base.x, WHITE, POLICY.usual))
+        begun.setdefault((id(form), z.tobytes(), *fit.effects, round(space.score(fit), 1)), (form, under, fit, z))
+    return sorted(begun.values(), key=lambda start: space.score(start[2]))
 
 
 def _once_more(space: Moves, objective: Objective, pi: PI, ends: Sequence[_End]) -> list[_Start]:
