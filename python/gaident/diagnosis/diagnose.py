@@ -166,7 +166,7 @@ def diagnose(
         hit = {r.digest: outliers for r, outliers in zip(prepared[0].given, lines, strict=True)}
 
         def driven_under(one: _Prepared) -> Driving:
-            clocked = controller is not None and controller.clock is not None
+            clocked = one.loop.at_rate or (controller is not None and controller.clock is not None)
             left_open = controller is not None and bool(controller.unknown)
             found = one.driving()
             known: dict[str, Any] = dict(outliers=hit, clocked=clocked, left_open=left_open)

@@ -107,7 +107,7 @@ class Work:
         data = replace(data.with_its_period(), clocked=self.driving.clocked)
         self.notes += period_seen(data)
         self.scales = scales_of(data)
-        self.controller_steps, self.at_controller, notes = controller_findings(data, self.scales)
+        self.controller_steps, self.at_controller, notes = controller_findings(data, self.scales, not self.driving.simulated)
         self.notes += notes
         self.controller_steps += (*self.driving.logged.findings, *self.driving.findings)
         # Limits that the log shows are part of every loop that is simulated in a fit.

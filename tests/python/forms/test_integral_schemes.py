@@ -20,14 +20,14 @@ GIVEN = ga.Cascade(ga.PI(0.03, 2.0), PERIOD)
 
 
 @cache
-def log(scheme: str) -> ga.Record:
-    """1500 lines of one mass, each the 4th sample, under levels with reversals, some at rest."""
+def log(scheme: str, every: int = 4, seed: int = 1) -> ga.Record:
+    """6000 samples of one mass under levels with reversals, some at rest, a line for each of `every`; even seed: an encoder."""
     rng = np.random.default_rng(5)
-    axis = Plant(J=2.5e-4, D=1.5e-3, kp=0.03, ki=2.0, dt=4 * PERIOD, cascade=GIVEN)
+    axis = Plant(J=2.5e-4, D=1.5e-3, kp=0.03, ki=2.0, dt=every * PERIOD, cascade=GIVEN)
     levels = rng.uniform(5.0, 60.0, 15) * np.resize([1.0, -1.0, 0.0], 15)
     command = np.repeat(levels, 100) + np.repeat(rng.choice([-1.0, 1.0], 150), 10)
     command[:20] = 0.0
-    return scheme_log(axis, np.repeat(command, 4), scheme, 1)
+    return scheme_log(axis, np.repeat(command, 4), scheme, seed)
 
 
 @pytest.mark.long
@@ -87,6 +87,51 @@ def test_an_integral_that_is_reset() -> None:
     driver = other_scheme([log("reset")], [], GIVEN, ())
     assert driver is not None and [f.effect for f in driver.findings] == ["integral_reset"]
     assert "begins at 0 wherever the command changes its sign" in driver.findings[0].evidence
+
+
+AT_RATE = {"decay": "anti_windup", "hold": "anti_windup", "dead band": "error_dead_band", "reset": "integral_reset"}
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("seed", [1, 2])
+@pytest.mark.parametrize("scheme", AT_RATE)
+def test_of_a_log_with_every_sample_the_law_makes_the_torque_to_its_rounding(scheme: str, seed: int) -> None:
+    rec = log(scheme, 1, seed)
+    driving = _Prepared.of(loop_of([rec], GIVEN.velocity), [rec], []).driving()
+    assert not driving.simulated and not driving.doubts
+    named = {f.effect: f.parameters for f in driving.findings}
+    at_limit = {"torque_saturation", "integration_rule"} if scheme in ("decay", "hold") else set()
+    assert set(named) == {AT_RATE[scheme]} | at_limit
+    shown = scheme_shown([rec], ga.Cascade(GIVEN.velocity))
+    assert shown is not None and shown.left < 1e-6 * float(np.abs(rec.torque).max())
+    if scheme in ("decay", "hold"):
+        kept = named["anti_windup"]["kept"]
+        assert kept.value == pytest.approx(DECAY if scheme == "decay" else 1.0, abs=1e-7)
+    if scheme == "dead band":
+        assert named["error_dead_band"]["width"].value == pytest.approx(BAND * float(np.abs(rec.command).max()), rel=0.02)
+
+
+def test_of_a_rounded_log_the_law_is_found_too() -> None:
+    """Four decimals of the velocity, as a text log has them."""
+    exact = log("decay", 1)
+    rec = exact.with_channels(velocity=np.round(exact.velocity, 4), torque=np.round(exact.torque, 5))
+    shown = scheme_shown([rec], ga.Cascade(GIVEN.velocity))
+    assert shown is not None and abs(shown.scheme.number - DECAY) < 4.0 * shown.std < 1e-3
+
+
+def test_of_a_log_with_every_sample_nothing_is_found_where_the_controller_makes_the_torque_or_another_one_does() -> None:
+    assert scheme_shown([log("", 1)], ga.Cascade(GIVEN.velocity)) is None
+    assert scheme_shown([log("dead band", 1)], ga.Cascade(ga.PI(0.045, 3.0))) is None
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("given", [GIVEN, GIVEN.velocity])
+def test_a_bare_pi_with_such_a_law_at_the_rate_of_the_log_is_no_faster_one(given: ga.Cascade | ga.PI) -> None:
+    """Where the law was not known, a sample time of a quarter of a line came closer, with a false delay of half of one."""
+    dia = ga.diagnose(log("decay", 1), given)
+    assert {f.effect for f in dia.causes} == {"integration_rule", "torque_saturation", "anti_windup"}
+    assert dia.verdict == "explained" and dia.mechanics["inertia"].value == pytest.approx(2.5e-4, rel=1e-3)
+    assert not any("samples about" in note or "Is this the controller" in note for note in dia.notes)
 
 
 def test_nothing_is_found_where_the_controller_is_another_one() -> None:

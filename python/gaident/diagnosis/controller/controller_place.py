@@ -127,8 +127,13 @@ def _gains_finding(records: Sequence[Record], shown: PI, off: Sequence[Replay]) 
     return Finding(name, {} if alone else gains, (), fall, gain, None, off[0].sentence, place="controller")
 
 
-def controller_findings(data: DataSet, scales: Scales) -> tuple[list[Finding], AtController, list[Text]]:
-    """(findings, what is decided, notes). Without a logged torque nothing is decided here."""
+def controller_findings(data: DataSet, scales: Scales, by_law: bool) -> tuple[list[Finding], AtController, list[Text]]:
+    """(findings, what is decided, notes). Without a logged torque nothing is decided here.
+
+    by_law: whether the torques follow from a law of the integral that no controller here has; all is decided then.
+    """
+    if by_law:
+        return [], AtController(_decided()), []
     controller = data.controller
     if controller is None or not all(r.torque is not None and controller.replayable(r) for r in data.read):
         return [], AtController(), []

@@ -181,9 +181,7 @@ def driving_of(
         records, validation, origin = _again(records, validation, origin, partial(commanded, controller=pi))
     follows = controller is not None and not doubts and all(controller.replayable(r) or comparable(r, controller) for r in whole)
     moved = aligned(records, validation, pi, follows, bool(doubts))
-    form = (
-        None if moved.shifts else driver_of(records, validation, pi, tuple(n.removeprefix("velocity.") for n in asked.estimates))
-    )
+    form = None if moved.shifts else _at_its_rate(records, validation, pi, asked)
     findings, numbers, limited, found = asked.findings, asked.estimates, False, asked.found
     if form is None:
         notes = (*(asked.notes or asked.numbers.trusted().notes), *notes)
@@ -237,6 +235,14 @@ def driving_of(
     if slower and used is not None and cascade_of(used).torque_filters and all(r.torque_is == MEASURED for r in made.read):
         return _by_what_was_measured(made, asked, driven.notes)
     return made
+
+
+def _at_its_rate(records: Sequence[Record], validation: Sequence[Record], pi: PI | None, asked: Loop) -> Driver | None:
+    """What a log at the rate of a bare PI shows in its place, where the torques do not follow from that; else None."""
+    if pi is None:
+        return None
+    law = None if asked.estimates else other_scheme(records, validation, pi, asked.findings)
+    return law or driver_of(records, validation, pi, tuple(n.removeprefix("velocity.") for n in asked.estimates))
 
 
 def _by_what_was_measured(made: Driving, asked: Loop, not_said: Sequence[Text]) -> Driving:

@@ -21,6 +21,7 @@ from gaident.diagnosis.controller.slow_forms import follow, run_error
 from gaident.diagnosis.library.settings import ANTI_WINDUP, OF_SETTING
 from gaident.identification.controller_numbers import Numbers, with_estimates
 from gaident.identification.replay.command_timing import timed
+from gaident.identification.replay.integral_schemes import scheme_shown
 from gaident.identification.replay.replay import replay
 from gaident.identification.replay.timed_record import plain_of
 from gaident.models.drive_torque import driven_by
@@ -89,6 +90,7 @@ class Loop:
     """The controller that a diagnosis works with: the given one, with its numbers, or the one that a slower log shows.
 
     period_notes: on a sample time of it that was not given. found: its numbers that were not given, or differ.
+    at_rate: whether the torque shows that the log has a line for each of its samples.
     simpler: the given one, or one that lacks a part of the form, from which a slow log's torque follows too, if not as closely.
     """
 
@@ -100,17 +102,28 @@ class Loop:
     period_notes: tuple[Text, ...] = ()
     found: FoundNumbers | None = None
     simpler: tuple[Loop, ...] = ()
+    at_rate: bool = False
 
 
 def loop_of(records: Sequence[Record], given: Controller | None) -> Loop:
     """The controller with estimates for what is None and, where a log has fewer lines than a bare PI in a Cascade has samples,
     in the form that the logged torque shows."""
     records = timed(records, given)
+    if _has_a_law(records, given):
+        return replace(_loop_of(records, given), at_rate=True)
     period = period_shown(records, given)
     if period is None or period.controller is given:  # none, or no sure one
         period = _formed(records, given) or period
     found = _loop_of(records, given if period is None else period.controller)
     return found if period is None else replace(found, period_notes=(period.note,))
+
+
+def _has_a_law(records: Sequence[Record], given: Controller | None) -> bool:
+    """Whether the integral of a bare PI follows a law, at the log's rate, that no `PI` has: the log has each of its samples."""
+    pi = bare_pi(given)
+    if pi is None or pi.unknown or pi.loop != "sampled" or any(r.torque is None for r in records):
+        return False
+    return scheme_shown(records, cascade_of(pi)) is not None
 
 
 def _formed(records: Sequence[Record], given: Controller | None) -> Period | None:

@@ -37,6 +37,7 @@ SCHEMES = {
     RESET: ("integral_reset", "", "", "its integral begins at 0 wherever {}"),
 }
 """Kind of a law -> (finding, parameter, its unit, words)."""
+HELD = "its integral stays as it is in each sample at the {torque} limit"
 OF_VARIANT = {
     "": "",
     "whole": "",
@@ -88,7 +89,7 @@ def other_form(records: Sequence[Record], validation: Sequence[Record], given: C
 def other_scheme(
     records: Sequence[Record], validation: Sequence[Record], given: Controller, findings: Sequence[Finding]
 ) -> Driver | None:
-    """The law of its integral that no `PI` has, where the torques of a slower log follow from it alone; else None.
+    """The law of its integral that no `PI` has, where the torques follow from it alone; else None.
 
     records, validation: as they were given. findings: of the controller's form, which `given` is already.
     """
@@ -99,6 +100,8 @@ def other_scheme(
     scheme, pi, limit = shown.scheme, shown.controller.velocity, shown.controller.velocity.torque_limit
     name, parameter, unit, words = SCHEMES[scheme.kind]
     law = say(words, *(() if scheme.kind == RESET else (scheme.number,)), OF_VARIANT[scheme.variant])
+    if scheme.kind == DECAY and scheme.number == 1.0:
+        law = say(HELD)
     text = (
         "The logged {torque} does not follow from the given controller (rms {:.2g} {N m}), but where {} (to {:.2g} {N m} rms). "
         "No model of the plant is involved."
@@ -120,13 +123,18 @@ def other_scheme(
         kept.append(Finding(OF_SETTING["torque_limit"], at_limit, (), 0.0, gain, None, evidence, place="controller"))
     new = Finding(name, numbers, (), 0.0, gain, None, evidence, place="controller")
 
+    slower = any(shown.controller.log_every(r.dt) > 1 for r in records)
+
     def driven(rec: Record) -> Record:
+        if not slower:
+            return driven_by(rec, shown.controller)
         if not comparable(rec, shown.controller):
             return straight_driven(rec, shown.controller)
         return driven_by(rec, shown.controller, shown.made(rec))
 
     driving, later = (tuple(map(driven, part)) for part in (records, validation))
-    notes = (evidence, say("No simulated loop has this law: the {torque} that it makes between the lines drives the models."))
+    drives = "{torque} that it makes between the lines" if slower else "logged {torque}"
+    notes = (evidence, say("No simulated loop has this law: the " + drives + " drives the models."))
     return Driver(driving, later, shown.controller, (*kept, new), notes, {}, None, simulated=False)
 
 

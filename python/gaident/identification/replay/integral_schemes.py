@@ -10,12 +10,15 @@ reset       I begins at 0 in a sample in which the command changes its sign, or 
 
 The number is that with the least squares of logged minus made torque at the lines, without its correlation from line to line.
 A law is shown where what is left is no more than what the velocity between the lines can make (`logged_torque.off_by`).
+Of a log with a line for each of the controller's samples nothing is lost: a law is shown where the torques follow to the rounding
+of the log (`replay.Allowed`), or to white noise of a measured torque.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, MutableMapping, Sequence
 from dataclasses import dataclass, replace
+from weakref import WeakKeyDictionary
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,7 +30,9 @@ from gaident.control.ticks import straight_between
 from gaident.data.record import Record
 from gaident.data.torque_kind import MEAN
 from gaident.identification.logged_stretches import Log, log_of, plateau_of
-from gaident.identification.logged_torque import comparable, not_followed, off_by
+from gaident.identification.logged_torque import comparable, not_followed, off_by, tells_of_controller
+from gaident.identification.replay.causes import white_noise
+from gaident.identification.replay.replay import Allowed, replay, velocity_steps
 from gaident.policy.table import POLICY
 
 __all__ = ["DEAD_BAND", "DECAY", "RESET", "Scheme", "SchemeShown", "scheme_shown"]
@@ -37,6 +42,7 @@ Vector = NDArray[np.float64]
 DECAY, DEAD_BAND, RESET = "decay", "dead band", "reset"
 LOST = np.append(0.0, np.geomspace(1e-4, 0.5, 16))  # no decision: a grid: of 1 - q
 ROUNDS = 2  # no decision: of a solver: how many steps, a third one changes nothing
+SEARCHED = 50_000  # no decision: samples of a record that a number is searched in; all of them have to follow
 BANDS = np.geomspace(1e-4, 0.5, 24)  # no decision: a grid: of the largest error
 
 
@@ -144,26 +150,45 @@ class SchemeShown:
         return _made(self.scheme, self.controller, _log_of(rec, self.controller))
 
 
+_KEPT: MutableMapping[Record, dict[tuple[object, ...], SchemeShown | None]] = WeakKeyDictionary()
+
+
 def scheme_shown(records: Sequence[Record], controller: Cascade) -> SchemeShown | None:
-    """The law beside a velocity controller without filters and feedforward that makes the torques of a slower log; or None.
+    """The law beside a velocity controller without filters and feedforward that makes the logged torques; or None.
 
     What `PI` has is not looked for: its integral is not held or tracked, and has no clamp of its own.
     Of a controller that holds its integral, and from which the torques follow, a decay is told that comes closer: it differs by
     little in each limited sample, and what a slow log lost hides that.
+    The answer is kept for as long as the first record is.
     """
+    if not records:
+        return None
+    kept = _KEPT.setdefault(records[0], {})
+    key = (*records[1:], controller)
+    if key not in kept:
+        kept[key] = _shown(records, controller)
+    return kept[key]
+
+
+def _shown(records: Sequence[Record], controller: Cascade) -> SchemeShown | None:
     pi = replace(controller.velocity.winding_up, integrator_limit=None)
     bare = Cascade(pi, controller.period, delay=controller.delay)
     plain = replace(controller, velocity=replace(pi, torque_limit=controller.velocity.torque_limit)) == bare
-    if not plain or any(r.torque_log == MEAN or not comparable(r, bare) for r in records):
+    at_rate = all(bare.log_every(r.dt) == 1 for r in records)
+    told = tells_of_controller if at_rate else comparable
+    if not plain or any(r.torque_log == MEAN or not told(r, bare) for r in records):
         return None
-    closer = not not_followed(records, controller)
+    if at_rate and all(replay(r, controller).follows or replay(r, controller).cause for r in records):
+        return None
+    closer = not at_rate and not not_followed(records, controller)
     if closer and controller.velocity.anti_windup != "hold":
         return None
     if pi.torque_limit is None:
         plateau = plateau_of(np.concatenate([np.abs(r.torque) for r in records if r.torque is not None]))
         pi = replace(pi, torque_limit=plateau if np.isfinite(plateau) else None)
         bare = replace(bare, velocity=pi)
-    logs = [_log_of(r, bare) for r in records]
+    whole = [_log_of(r, bare) for r in records]
+    logs = [_log_of(r[:SEARCHED], bare) for r in records] if at_rate else whole
     if closer and max(float(np.abs(log.torque).max()) for log in logs) < POLICY.at_limit * pi.limits[0]:
         return None
     at_limit = [] if pi.torque_limit is None else [replace(pi, anti_windup="hold")]
@@ -181,16 +206,26 @@ def scheme_shown(records: Sequence[Record], controller: Cascade) -> SchemeShown 
         again = _fitted(logs, scheme.kind, scheme.variant, other)
         if again[0] < POLICY.each_number * left:
             (left, scheme), bare = again, other
-    scheme, std = _number(logs, scheme, bare)
+    scheme, std = _number(logs, scheme, bare, at_rate)
     left = _rms(_left(logs, scheme, bare))
-    follows = closer or all(
-        off_by(rec, log, bare, lambda one, straight: _made(scheme, bare, one, straight)[:: _every(one)]) == 0.0
-        for rec, log in zip(records, logs, strict=True)
-    )
+    made_of = _exact if at_rate else _follows
+    follows = closer or all(made_of(rec, log, scheme, bare) for rec, log in zip(records, whole, strict=True))
     decays = not closer or 1.0 - scheme.number > POLICY.check_deviations * std
     if not (follows and decays and left < POLICY.each_number * before):
         return None
     return SchemeShown(scheme, bare, std, before, left, sum(len(log.torque) for log in logs), closer)
+
+
+def _follows(rec: Record, log: Log, scheme: Scheme, controller: Cascade) -> bool:
+    """Whether the torque of a slower log follows, as far as its lines can tell."""
+    return off_by(rec, log, controller, lambda one, straight: _made(scheme, controller, one, straight)[:: _every(one)]) == 0.0
+
+
+def _exact(rec: Record, log: Log, scheme: Scheme, controller: Cascade) -> bool:
+    """Whether the torque of a log at the controller's rate follows, as one that is replayed has to (`replay`)."""
+    pi, off = controller.velocity, log.torque - _made(scheme, controller, log)
+    allowed = (Allowed.of(rec, log.command, pi, log.torque, step) for (step,) in velocity_steps([rec]))
+    return any(one(off, pi.limits) for one in allowed) or white_noise(off, log.torque) > 0.0
 
 
 def _kinds(pi: PI, decays: bool) -> Iterator[tuple[str, str]]:
@@ -232,13 +267,13 @@ def _fitted(logs: Sequence[Log], kind: str, variant: str, controller: Cascade) -
     return _least(left, BANDS * largest, lambda width: Scheme(kind, variant, width))
 
 
-def _number(logs: Sequence[Log], scheme: Scheme, controller: Cascade) -> tuple[Scheme, float]:
+def _number(logs: Sequence[Log], scheme: Scheme, controller: Cascade, at_rate: bool) -> tuple[Scheme, float]:
     """(the law with its number by c(k) = d(k) - rho d(k-1), d: logged minus made torque, its deviation).
 
     What the velocity did between the lines adds up in d (Cochrane and Orcutt 1949).
     scheme: with the number that leaves least without rho.
     The deviation contains what a velocity that goes straight between the lines, another rule of integration, and no correlation
-    would change.
+    would change. A log at the controller's rate shows the rule, too.
     """
     if scheme.kind == RESET:
         return scheme, 0.0
@@ -260,8 +295,8 @@ def _number(logs: Sequence[Log], scheme: Scheme, controller: Cascade) -> tuple[S
         together = sum(float(d[1:] @ d[:-1]) for d in left)
         rho = float(np.clip(together / power, 0.0, 1.0)) if power > 0.0 else 0.0
         scheme = nearest(controller)
-    others = [replace(controller, velocity=replace(controller.velocity, rule=rule)) for rule in RULES]
-    by_rule = max(abs(nearest(other).number - scheme.number) for other in others)
+    others = [] if at_rate else [replace(controller, velocity=replace(controller.velocity, rule=rule)) for rule in RULES]
+    by_rule = max((abs(nearest(other).number - scheme.number) for other in others), default=0.0)
 
     def made(by: float = 0.0, straight: bool = False) -> Vector:
         torques = (_made(of(scheme.number + by), controller, log, straight)[:: _every(log)] for log in logs)

@@ -27,7 +27,7 @@ from gaident.identification.replay.causes import Explanation, explain, rounded_c
 from gaident.models.made_torque import stored_torque
 from gaident.policy.table import POLICY
 
-__all__ = ["Replay", "replay", "rounding_of", "tolerance_of", "velocity_steps"]
+__all__ = ["Allowed", "Replay", "replay", "rounding_of", "tolerance_of", "velocity_steps"]
 
 Vector = NDArray[np.float64]
 
