@@ -53,11 +53,16 @@ def jumps_of(records: Sequence[Record], every: int, lengths: Sequence[int]) -> U
     return Unsure(drawn, at, jump, usual, spread, rise)
 
 
-def shape_between(law: Law, unsure: Unsure, places: tuple[Place, ...], given: PI) -> tuple[Law, Shape]:
-    """(the regression with the most probable times as its noise, the filters' numbers that leave least of it)."""
+def shape_between(
+    law: Law, unsure: Unsure, places: tuple[Place, ...], given: PI, starts: Sequence[Vector] | None = None
+) -> tuple[Law, Shape]:
+    """(the regression with the most probable times as its noise, the filters' numbers that leave least of it).
+
+    starts: of these numbers; None: a grid.
+    """
     gains = np.array([given.kp, given.kp, given.ki, *np.zeros(2 + len(law.lengths))])
     tried: list[tuple[float, int, Law, Shape]] = []
-    for start in grid_of(places):
+    for start in starts or grid_of(places):
         one = _losing(law, unsure, Shape(places, start, gains, np.zeros(0)), unsure.usual)
         shape = solved_shape(one, places, start)
         tried.append((cost_of_left(one, shape.left), len(tried), one, shape))

@@ -39,15 +39,27 @@ INSIDE = 1e-9  # no decision: a start: so far inside of its bound a search begin
 SUM_ROUNDING = 1e-9  # no decision: of the largest torque, what a sum is exact to
 
 
-def compared(law: Law, given: PI, floor: float, unknown: tuple[str, ...], unsure: Unsure | None = None) -> list[FormCandidate]:
-    """Every form with every set of filters that is needed, the best first; unsure: jumps between the lines of unknown times."""
+def compared(
+    law: Law,
+    given: PI,
+    floor: float,
+    unknown: tuple[str, ...],
+    unsure: Unsure | None = None,
+    near: Shape | None = None,
+) -> list[FormCandidate]:
+    """Every form with every set of filters that is needed, the best first.
+
+    unsure: jumps between the lines of unknown times; of two filters then only those of `near` are tried, from its numbers.
+    """
     candidates: list[FormCandidate] = []
     followed: int | None = None
-    for places in FILTER_SETS if law.every == 1 else FILTER_SETS_OF_ONE:
+    two = () if near is None or near.places in FILTER_SETS_OF_ONE else (near.places,)
+    for places in FILTER_SETS if unsure is None else (*FILTER_SETS_OF_ONE, *two):
         if followed is not None and len(places) > followed:
             break  # where only rounding or white noise is left, another filter improves nothing
         if unsure is not None:
-            one, shape = shape_between(law, unsure, places, given)
+            starts = [near.numbers] if near is not None and places in two else None
+            one, shape = shape_between(law, unsure, places, given, starts)
         else:
             one, shape = law, fitted_shape(law, places, floor)
             for _ in range(ROUNDS if law.every > 1 else 0):

@@ -29,7 +29,7 @@ PLACES: tuple[Place, ...] = (
 FILTER_SETS: tuple[tuple[Place, ...], ...] = tuple(s for k in range(3) for s in combinations(PLACES, k))
 """None, one, and two filters, the fewer first."""
 FILTER_SETS_OF_ONE = FILTER_SETS[: 1 + len(PLACES)]
-"""What a slower log is searched for: between its lines two filters look like one."""
+"""What is searched together with the times of jumps between the lines."""
 
 # Starts of the search: a low pass in samples, a notch as share of the sampling frequency, and its dampings.
 NOTCHES = tuple(product(FREQUENCIES, ((0.1, 0.7), (0.3, 1.5))))

@@ -128,7 +128,7 @@ def _form_of(
         open_times = between and law.around is None and (following is None or not following.strictly)
         unsure = jumps_of(records, law.every, law.lengths) if open_times else None
         if unsure is not None:
-            told = _told(records, given, compared(law, given, floor, unknown, unsure))
+            told = _told(records, given, compared(law, given, floor, unknown, unsure, candidates[0].shape))
             if told is not None:
                 return _with_simpler(_with_limit(told.records, given, told.candidates, told.fitted), records, given, candidates)
         return _with_simpler(_shown_slowly(records, given, candidates, following), records, given, candidates)
