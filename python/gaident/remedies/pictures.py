@@ -14,6 +14,8 @@ from gaident.control.controller import Controller
 from gaident.policy.table import POLICY
 from gaident.remedies.loops import Loops, frequencies_of
 from gaident.remedies.plants import sampled_plants
+from gaident.remedies.steady.laws import FrictionLaw
+from gaident.remedies.steady.plateaus import Plateau
 from gaident.results.retuning import Retuning
 from gaident.show.draw import new_figure
 from gaident.show.report.views import LoopCurves
@@ -25,22 +27,49 @@ __all__ = ["loop_curves", "plot_friction", "plot_retuning"]
 
 COLOURS = {"before": "#888888", "after": "#1f77b4"}
 SHOWN = 1e-3  # no decision: drawn: lowest size of a loop
+STYLES = ("-", "--")
+NAMED = 8  # no decision: drawn: records that a legend names
+LOWEST, CURVE = 1e-3, 400  # no decision: drawn: lowest speed of a law, of the highest, and its points
 
 
 def plot_friction(
     velocity: NDArray[np.float64],
     rows: Sequence[tuple[str, NDArray[np.float64], NDArray[np.float64]]],
     axis: str,
+    plateaus: Sequence[Plateau] = (),
+    laws: Sequence[FrictionLaw] = (),
 ) -> Figure:
-    """Torque over the velocity, a line with the scatter of its bins for each record: (name, mean, scatter)."""
-    figure = new_figure(8.0, 5.0)
-    ax = figure.subplots()
+    """Torque over the velocity, a line with the scatter of its bins for each record: (name, mean, scatter).
+
+    Beside it, where speeds are held, those with their deviations, the law and the best of its rivals.
+    """
+    figure = new_figure(8.0 if not plateaus else 12.0, 5.0)
+    ax, *others = figure.subplots(1, 2 if plateaus else 1, squeeze=False)[0]
+    named = len(rows) <= NAMED
     for name, mean, scatter in rows:
-        ax.errorbar(velocity, mean, scatter, marker=".", capsize=2.0, label=name)
-    ax.axhline(0.0, color="black", linewidth=0.5)
-    ax.set_xlabel(f"velocity [{velocity_unit(axis)}]")
+        ax.errorbar(velocity, mean, scatter, marker=".", capsize=2.0, label=name if named else None)
     ax.set_ylabel(said(say("{torque} without that of the {inertia}"), axis) + f" [{unit('N m', axis)}]")
-    ax.legend()
+    if named:
+        ax.legend()
+    for other in others:
+        for name in dict.fromkeys(p.record for p in plateaus):
+            own = [p for p in plateaus if p.record == name]
+            points = zip(*((p.velocity, p.torque, p.std) for p in own), strict=True)
+            other.errorbar(*points, fmt=".", capsize=2.0, label=name if named else None)
+        fastest = max(abs(p.velocity) for p in plateaus)
+        ways = sorted({float(np.sign(p.velocity)) for p in plateaus})
+        for law, style in zip(laws, STYLES, strict=False):
+            label: str | None = said(law.name, axis)
+            for way in ways:
+                w = way * np.linspace(LOWEST, 1.0, CURVE) * fastest
+                other.plot(w, law.torque(w), style, color="black", linewidth=1.0, label=label)
+                label = None
+        other.set_ylabel(said(say("{torque} at held speeds"), axis) + f" [{unit('N m', axis)}]")
+        if named or laws:
+            other.legend(fontsize="small")
+    for each in (ax, *others):
+        each.axhline(0.0, color="black", linewidth=0.5)
+        each.set_xlabel(f"velocity [{velocity_unit(axis)}]")
     return figure
 
 
