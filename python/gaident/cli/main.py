@@ -32,6 +32,7 @@ COMMANDS = {
     "export": "export:export_command",
     "retune": "remedies:retune_command",
     "feedforward": "remedies:feedforward_command",
+    "map": "friction:map_command",
     "effects": "effects:effects_command",
     "demo": "demo:demo_command",
     "reproduce": "reproduce:reproduce_command",

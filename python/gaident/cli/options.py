@@ -22,9 +22,12 @@ from gaident.cli.log_options import add_log_commands, add_log_options, gain, num
 from gaident.cli.remedy_options import (
     FEEDFORWARD_EXAMPLES,
     FEEDFORWARD_HELP,
+    MAP_EXAMPLES,
+    MAP_HELP,
     RETUNE_EXAMPLES,
     RETUNE_HELP,
     add_feedforward_options,
+    add_map_options,
     add_retune_options,
 )
 from gaident.cli.report_options import REPORT_EXAMPLES, REPORT_HELP, add_report_option, add_report_options
@@ -255,6 +258,10 @@ def parser_of(commands: Mapping[str, str]) -> argparse.ArgumentParser:
     line = "saved diagnosis -> tables of friction, gravity, inertia"
     sub = command("feedforward", "RESULT.json ", line, FEEDFORWARD_HELP, FEEDFORWARD_EXAMPLES)
     add_feedforward_options(sub)
+
+    sub = command("map", "LOG... ", "log -> friction at held speeds, and its law", MAP_HELP, MAP_EXAMPLES)
+    add_map_options(sub)
+    add_log_options(sub)
 
     sub = command("effects", "[NAME ...] ", "what a model can carry beyond its linear part", EFFECTS_HELP)
     sub.add_argument("names", nargs="*", metavar="NAME", help="only these effects, each with the bounds of its parameters")

@@ -1,4 +1,4 @@
-"""Options and help of `gaident retune` and `gaident feedforward`."""
+"""Options and help of `gaident retune`, `gaident feedforward` and `gaident map`."""
 
 from __future__ import annotations
 
@@ -11,9 +11,12 @@ from gaident.policy.table import POLICY
 __all__ = [
     "FEEDFORWARD_EXAMPLES",
     "FEEDFORWARD_HELP",
+    "MAP_EXAMPLES",
+    "MAP_HELP",
     "RETUNE_EXAMPLES",
     "RETUNE_HELP",
     "add_feedforward_options",
+    "add_map_options",
     "add_retune_options",
 ]
 
@@ -37,6 +40,17 @@ FEEDFORWARD_EXAMPLES = """\
 examples:
   gaident feedforward run.json --speed 80                    prints a summary
   gaident feedforward run.json --speed 80 --csv axis.csv --c axis.c
+"""
+MAP_HELP = """\
+Maps the friction of an axis: torque against velocity at the speeds that its logs hold, both directions, with
+deviations, and the law of friction that fits it best with its rivals. It needs velocity and torque, no controller,
+and no log as fast as the loop: a line every 20 ms will do.
+"""
+MAP_EXAMPLES = """\
+examples:
+  gaident map speeds.csv --drive drive.toml
+  gaident map cold.csv warm.csv --drive drive.toml --temperature motor_temp --out friction
+      writes friction/friction_map.csv (held speeds), bins.csv, friction_map.json and friction_map.png
 """
 
 
@@ -73,3 +87,15 @@ def add_feedforward_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--c", metavar="FILE", help="write one C99 file with a function of the motion")
     parser.add_argument("--axis", choices=AXES, help="words and units of what is printed (default: those of the result)")
     parser.add_argument("--json", action="store_true", help="print the tables as JSON instead of the summary")
+
+
+def add_map_options(parser: argparse.ArgumentParser) -> None:
+    """What `gaident map` takes beside how a log is read."""
+    parser.add_argument("logs", nargs="+", metavar="LOG", help="log file; several are of one axis")
+    g = parser.add_argument_group("the map")
+    g.add_argument("--inertia", type=number, metavar="X", help="inertia of the axis [kg m^2] (default: what the logs show)")
+    g.add_argument("--temperature", metavar="NAME", help="column with the temperature")
+    g.add_argument("--bins", type=int, metavar="N", help="bins of each direction between the held speeds (default 12)")
+    g = parser.add_argument_group("results")
+    g.add_argument("-o", "--out", metavar="DIR", help="folder for the tables (CSV, JSON) and the picture")
+    g.add_argument("--json", action="store_true", help="print what friction_map.json has instead of the summary")

@@ -11,15 +11,14 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from gaident.control.controller import Controller
-from gaident.data.readers import read, read_columns
+from gaident.data.readers import read
 from gaident.data.record import Record
 from gaident.diagnosis.blas import one_thread
 from gaident.diagnosis.diagnose import diagnose
 from gaident.drive.drive_file import Drive
-from gaident.errors import GaidentError, ReadError
+from gaident.drive.temperature import temperature_of
+from gaident.errors import GaidentError
 from gaident.fleets.rows import rows_of
 from gaident.identification.identify import identify
 from gaident.processors import one_processor
@@ -172,14 +171,5 @@ def _records(task: FleetTask, log: str) -> list[Record]:
 
 def _mean_of(task: FleetTask, log: str) -> float | None:
     """Mean of the column with the temperature, in its own unit; None where a log has no value of it."""
-    general = task.reading if task.drive is None else task.drive.general
-    text = {name: general[name] for name in ("delimiter", "decimal", "skip", "encoding") if name in general}
-    found = read_columns(log, **text)
-    values = found.get(str(task.temperature))
-    if values is None:
-        plain = {name.split(" [")[0]: column for name, column in found.items()}
-        values = plain.get(str(task.temperature))
-    if values is None:
-        raise ReadError(f"{log}: there is no column {task.temperature!r} with the temperature; it has {', '.join(found)}")
-    known = values[np.isfinite(values)]
+    known = temperature_of(log, str(task.temperature), task.reading if task.drive is None else task.drive.general)
     return float(known.mean()) if known.size else None

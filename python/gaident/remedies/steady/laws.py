@@ -41,6 +41,7 @@ Matrix = NDArray[np.float64]
 STEP = 1e-6  # no decision: the step of a difference, of a number's own size
 RANK = 1e-6  # no decision: exact to so much, columns that depend on each other are one in floating point
 SNAP = 1e-3  # no decision: exact to; deviations of the plateaus, by which a number near its bound is as good as there
+DIGITS = 6  # no decision: rounding; of BIC units, behind which two laws that are the same at these speeds may differ
 HALVINGS = 60  # no decision: exact to the last digit of a number
 TINY = 1e-300  # no decision: no division by 0
 
@@ -161,9 +162,9 @@ def speeds_of(plateaus: Sequence[Plateau]) -> list[float]:
 
 
 def missing_of(speeds: int) -> list[Cause]:
-    """Effects that so many speeds are too few for, beside viscous friction."""
+    """Effects that so many speeds are too few for, beside viscous friction; a drag beside dry friction, too."""
     levels, drags, _ = _rows()
-    return [row for row in (*levels, *drags) if 1 + row.size > speeds]
+    return [row for row in levels if 1 + row.size > speeds] + [row for row in drags if 2 + row.size > speeds]
 
 
 def laws_of(plateaus: Sequence[Plateau]) -> Fitted:
@@ -181,7 +182,7 @@ def laws_of(plateaus: Sequence[Plateau]) -> Fitted:
         std = np.hypot(std, beyond)
         fits = _all(w, torque, std, scales, speeds, {tuple(row.name for row in law.rows): law for law in fits})
     known = [(law, _bic(law, len(w))) for law in fits]
-    known = sorted(known, key=lambda one: one[1])
+    known.sort(key=lambda one: (round(one[1], DIGITS), any(row.constant for row in one[0].rows)))
     best, least = known[0]
     kept: list[tuple[_Law, float]] = []
     for law, value in known:

@@ -7,8 +7,8 @@
 With s the velocity's running mean, and sigma the deviation of neighbouring means, a speed v is held
 
     (1) while all s lie within v +- width/2,    width = max(2 still |v|, above_noise sigma)
-    (2) and its halves differ by less than no_ramp width: on a ramp the longest such stretch fills the width, its halves differ
-        by half of it, whatever the inertia
+    (2) and its halves, and its middle and its ends, differ by less than no_ramp width: the longest such stretch of a ramp, or of
+        a turning point, fills the width, so that they differ by half of it, whatever the inertia
     (3) for held_samples at least, in one direction: all s have the sign of v, |v| is above a step of the sensor and above_noise
         deviations of a mean, and a logged position moves by half of v T at least: at rest a sensor may show some velocity
     (4) and, where J is known, |J a| < check_torque |mean(u)|
@@ -95,16 +95,14 @@ def plateaus_of(rec: Record, name: str, inertia: float | None, temperature: Vect
     smooth = _running_mean(rec.velocity, width)
     step, rounding = lattice_step(rec.velocity), lattice_step(rec.torque)
     found, sticking, accelerating = [], 0, 0
-    for start, stop in _joined(_stretches(smooth, _scatter(smooth, width)), rec.velocity, smooth):
+    for start, stop, turns in _joined(_stretches(smooth, _scatter(smooth, width)), rec.velocity, smooth):
+        if turns:
+            continue
         here = slice(start, stop)
         w, u = rec.velocity[here], rec.torque[here]
         speed = float(np.mean(w))
-        if abs(speed) <= max(step, POLICY.above_noise * float(np.std(w)) / np.sqrt(effective_samples(w))):
-            continue
-        if (
-            rec.position is not None
-            and 2 * abs(rec.position[stop - 1] - rec.position[start]) < abs(speed) * (len(w) - 1) * rec.dt
-        ):
+        still = abs(speed) <= max(step, POLICY.above_noise * float(np.std(w)) / np.sqrt(effective_samples(w)))
+        if still or (rec.position is not None and _stays(rec.position[here], speed * rec.dt)):
             continue
         if not np.all(np.sign(speed) * smooth[here] > 0.0):
             sticking += 1
@@ -133,6 +131,11 @@ def plateaus_of(rec: Record, name: str, inertia: float | None, temperature: Vect
     return found, LeftOut(sticking, accelerating)
 
 
+def _stays(position: Vector, step: float) -> bool:
+    """Whether a position moves by less than half of what the velocity says, `step` to a line."""
+    return bool(2 * abs(position[-1] - position[0]) < abs(step) * (len(position) - 1))
+
+
 def _running_mean(x: Vector, width: int) -> Vector:
     """Mean over an odd width, the ends repeated."""
     half = min(width, len(x)) // 2
@@ -148,42 +151,6 @@ def _scatter(smooth: Vector, width: int) -> float:
     return MEDIAN * float(np.median(bent[moves])) / float(np.sqrt(SECOND)) if np.any(moves) else 0.0
 
 
-def _joined(parts: Sequence[tuple[int, int]], velocity: Vector, smooth: Vector) -> list[tuple[int, int]]:
-    """Stretches (start, stop) in their order, neighbours of one speed as one: all of them, else those before and after a cut.
-
-    The cut is at the widest gap, of the lengths beside it, or where neighbours differ most.
-    """
-    if len(parts) < 2:
-        return list(parts)
-    whole = slice(parts[0][0], parts[-1][1])
-    pairs = list(itertools.pairwise(parts))
-    gaps = [_gap(before, after, smooth) for before, after in pairs]
-    if (
-        max(gaps) < 1.0
-        and np.ptp(np.sign(smooth[whole])) == 0.0
-        and _of_one_speed(parts, velocity, float(np.mean(velocity[whole])))
-    ):
-        return [(whole.start, whole.stop)]
-    means = [float(np.mean(velocity[start:stop])) for start, stop in parts]
-    at = 1 + int(np.argmax(gaps if max(gaps) >= 1.0 else np.abs(np.diff(means))))
-    return [*_joined(parts[:at], velocity, smooth), *_joined(parts[at:], velocity, smooth)]
-
-
-def _gap(before: tuple[int, int], after: tuple[int, int], smooth: Vector) -> float:
-    """Length of the gap between two stretches, of the longer one; 0 where the speed in it is near theirs."""
-    speed, between = float(np.mean(smooth[before[0] : after[1]])), smooth[before[1] : after[0]]
-    if np.all(np.abs(between - speed) < SIDES * POLICY.apart * abs(speed)):
-        return 0.0
-    return (after[0] - before[1]) / max(before[1] - before[0], after[1] - after[0])
-
-
-def _of_one_speed(parts: Sequence[tuple[int, int]], velocity: Vector, speed: float) -> bool:
-    """Whether each has the speed of all."""
-    own = [velocity[start:stop] for start, stop in parts]
-    reach = POLICY.apart * abs(speed)
-    return all(abs(np.mean(w) - speed) < max(reach, POLICY.standing_noise * np.std(w) / np.sqrt(len(w))) for w in own)
-
-
 def _slope(w: Vector, dt: float) -> tuple[float, float]:
     """Slope of a straight line through w [rad/s^2], and its standard deviation."""
     t = dt * (np.arange(len(w)) - 0.5 * (len(w) - 1))
@@ -192,13 +159,52 @@ def _slope(w: Vector, dt: float) -> tuple[float, float]:
     return slope, float(np.sqrt(np.mean(left**2) * len(w) / effective_samples(left) / (t @ t)))
 
 
-def _stretches(smooth: Vector, scatter: float) -> list[tuple[int, int]]:
-    """(start, stop) of the stretches that keep to (1) and (2) and are long enough, in their order."""
-    found: list[tuple[int, int]] = []
+class _Part(NamedTuple):
+    """A stretch in the band; turns: it fills the band as a turning point does."""
+
+    start: int
+    stop: int
+    turns: bool = False
+
+
+def _joined(parts: Sequence[_Part], velocity: Vector, smooth: Vector) -> list[_Part]:
+    """Stretches in their order, neighbours of one speed as one: all of them, else those before and after a cut.
+
+    The cut is at the widest gap, of the lengths beside it, or where neighbours differ most.
+    """
+    if len(parts) < 2:
+        return list(parts)
+    whole = slice(parts[0].start, parts[-1].stop)
+    gaps = [_gap(before, after, smooth) for before, after in itertools.pairwise(parts)]
+    one_way = np.ptp(np.sign(smooth[whole])) == 0.0
+    if max(gaps) < 1.0 and one_way and _of_one_speed(parts, velocity, float(np.mean(velocity[whole]))):
+        return [_Part(whole.start, whole.stop)]
+    means = [float(np.mean(velocity[part.start : part.stop])) for part in parts]
+    at = 1 + int(np.argmax(gaps if max(gaps) >= 1.0 else np.abs(np.diff(means))))
+    return [*_joined(parts[:at], velocity, smooth), *_joined(parts[at:], velocity, smooth)]
+
+
+def _gap(before: _Part, after: _Part, smooth: Vector) -> float:
+    """Length of the gap between two stretches, of the longer one; 0 where the speed in it is near theirs."""
+    speed, between = float(np.mean(smooth[before.start : after.stop])), smooth[before.stop : after.start]
+    if np.all(np.abs(between - speed) < SIDES * POLICY.apart * abs(speed)):
+        return 0.0
+    return (after.start - before.stop) / max(before.stop - before.start, after.stop - after.start)
+
+
+def _of_one_speed(parts: Sequence[_Part], velocity: Vector, speed: float) -> bool:
+    """Whether each has the speed of all."""
+    own = [velocity[part.start : part.stop] for part in parts]
+    reach = POLICY.apart * abs(speed)
+    return all(abs(np.mean(w) - speed) < max(reach, POLICY.standing_noise * np.std(w) / np.sqrt(len(w))) for w in own)
+
+
+def _stretches(smooth: Vector, scatter: float) -> list[_Part]:
+    """The stretches that keep to (1), are no ramp and long enough, in their order."""
+    found: list[_Part] = []
     for share in (POLICY.still, POLICY.apart):
-        left = itertools.pairwise([0, *itertools.chain(*sorted(found)), len(smooth)])
-        parts = list(left)[::2]
-        found += _longest(smooth, parts, _Width(share, scatter))
+        ends = [0, *(end for part in sorted(found) for end in (part.start, part.stop)), len(smooth)]
+        found += _longest(smooth, list(zip(ends[::2], ends[1::2], strict=True)), _Width(share, scatter))
     return sorted(found)
 
 
@@ -212,7 +218,7 @@ class _Width(NamedTuple):
         return max(SIDES * self.share * abs(speed), POLICY.above_noise * self.scatter)
 
 
-def _longest(smooth: Vector, parts: list[tuple[int, int]], width: _Width) -> Iterator[tuple[int, int]]:
+def _longest(smooth: Vector, parts: list[tuple[int, int]], width: _Width) -> Iterator[_Part]:
     """Of each part the longest stretch in the band, and of what is left on either side; those of a ramp left out."""
     reach = _reach(smooth, width)
     while parts:
@@ -225,10 +231,14 @@ def _longest(smooth: Vector, parts: list[tuple[int, int]], width: _Width) -> Ite
         if stop - start < POLICY.held_samples:
             continue
         parts += [(low, start), (stop, high)]
-        middle = (start + stop) // 2
-        first, second = float(np.median(smooth[start:middle])), float(np.median(smooth[middle:stop]))
-        if abs(first - second) < POLICY.no_ramp * width.at((first + second) / 2):
-            yield start, stop
+        first, second, third, last = np.array_split(smooth[start:stop], 4)
+        little = POLICY.no_ramp * width.at(float(np.median(smooth[start:stop])))
+        if _differ([first, second], [third, last]) < little:
+            yield _Part(start, stop, _differ([first, last], [second, third]) >= little)
+
+
+def _differ(some: list[Vector], others: list[Vector]) -> float:
+    return abs(float(np.median(np.concatenate(some)) - np.median(np.concatenate(others))))
 
 
 def _reach(smooth: Vector, width: _Width) -> NDArray[np.intp]:
