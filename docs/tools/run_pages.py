@@ -25,7 +25,10 @@ import gaident as ga
 from gaident.cli import main as gaident
 
 PAGES = ("tutorial.md",)
-WORKED = ("how-to/servo-trace.md", "how-to/new-gains.md", "how-to/feedforward.md", "how-to/frequency-responses.md")
+WORKED = (
+    *("how-to/servo-trace.md", "how-to/new-gains.md", "how-to/feedforward.md", "how-to/frequency-responses.md"),
+    "how-to/friction-map.md",
+)
 FENCED = re.compile(r'^```(python|toml title="([^"]+)"|console|text)\n(.*?)^```$', re.DOTALL | re.MULTILINE)
 NUMBER = re.compile(r"-?\d+(?:\.\d+)?")
 LEFT_OUT = "..."  # a line that stands for any number of lines

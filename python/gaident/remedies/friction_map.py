@@ -128,15 +128,20 @@ class FrictionMap:
         `axis`: "linear" for units of m and N, "rotary" for rad and N m; None: those of the axis.
         """
         axis = self.axis if axis is None else axis
+        parts = [*held_lines(self.plateaus, self._laws, self.temperature_slope, self.notes, axis), self._between(axis)]
+        return "\n\n".join("\n".join(part) for part in parts if part)
+
+    def _between(self, axis: str) -> list[str]:
+        """The friction of each record by speed, of what moves between held speeds too; nothing where no inertia is known."""
         speeds = self.velocity[len(self.velocity) // 2 :]
         shown = [k for k in range(len(speeds)) if np.any(np.isfinite(self.friction[:, k]))]
+        if not shown or not np.isfinite(self.inertia):
+            return []
         rows: list[tuple[str, ...]] = [(f"speed [{unit('rad/s', axis)}]", *self.names)]
         for k in shown:
             rows.append((number(float(speeds[k])), *(number(float(f)) if np.isfinite(f) else "" for f in self.friction[:, k])))
-        taken = say(" at {} {kg m^2}", number(self.inertia)) if np.isfinite(self.inertia) else ""
-        head = said(say("Friction [{N m}]{}, half of the difference of both directions", taken), axis)
-        parts = held_lines(self.plateaus, self._laws, self.temperature_slope, self.notes, axis)
-        return "\n\n".join("\n".join(part) for part in [*parts, [head, *table(rows)] if shown else []] if part)
+        text = say("Friction [{N m}] at {} {kg m^2}, half of the difference of both directions", number(self.inertia))
+        return [said(text, axis), *table(rows)]
 
     def to_csv(self, path: str | os.PathLike[str], rows: str = "bins") -> None:
         """Write a table as CSV, in SI units.

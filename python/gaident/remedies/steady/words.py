@@ -67,7 +67,7 @@ def notes_of(
         text = "{} stretch{} left out, in which the {torque} of the acceleration is more than {} of the whole."
         found.append(say(text, accelerating, _are(accelerating), percent(POLICY.check_torque)))
     if np.isnan(inertia):
-        text = "The records show no {inertia}, and none was given: the {torque} between held speeds has that of the acceleration."
+        text = "The records show no {inertia}, and none was given: held speeds alone tell the friction here."
         found.append(say(text))
     return found
 
