@@ -1,4 +1,4 @@
-"""gaident retune and gaident feedforward: what they print and write is what the package says."""
+"""gaident retune, feedforward and map: what they print and write is what the package says."""
 
 from __future__ import annotations
 
@@ -54,6 +54,55 @@ def test_feedforward_prints_and_writes(here: Path, result: ga.Diagnosis, capsys:
     assert len(Path("t.csv").read_text().splitlines()) == 1 + 3 + 16
     assert main(["feedforward", "run.json", "--speed", "30", "--json"]) == 0
     assert json.loads(capsys.readouterr().out)["schema"] == "gaident/feedforward"
+
+
+SPEEDS_LOG = ["speeds.csv", "--columns", "time=t,velocity=w,torque=M", "--unit", "time=s,velocity=rad/s,torque=Nm"]
+
+
+def write_speeds() -> ga.Record:
+    """The log of held speeds, a line every 20 ms, with a temperature beside: speeds.csv."""
+    rng = np.random.default_rng(2)
+    w = np.repeat([2.0, 5.0, 10.0, 20.0, -20.0, -10.0, -5.0, -2.0], 100)
+    torque = 0.05 * np.sign(w) + 2e-3 * w + 1e-3 * rng.standard_normal(len(w))
+    t, heat = 0.02 * np.arange(len(w)), np.linspace(20.0, 40.0, len(w))
+    np.savetxt("speeds.csv", np.column_stack([t, w, torque, heat]), delimiter=",", header="t,w,M,heat", comments="")
+    return ga.read(
+        "speeds.csv", {"time": "t", "velocity": "w", "torque": "M"}, {"time": "s", "velocity": "rad/s", "torque": "Nm"}
+    )
+
+
+def test_map_prints_and_writes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    monkeypatch.chdir(tmp_path)
+    rec = write_speeds()
+    found = ga.friction_map(rec)
+    assert main(["map", *SPEEDS_LOG]) == 0 and capsys.readouterr().out == f"{found.summary()}\n"
+    assert found.law is not None and found.law.effects["coulomb_friction"]["torque"].value == pytest.approx(0.05, abs=1e-3)
+    assert main(["map", *SPEEDS_LOG, "--out", "friction", "--temperature", "heat", "--inertia", "1e-3", "--bins", "4"]) == 0
+    told = ga.friction_map(rec, inertia=1e-3, bins=4, temperature=np.linspace(20.0, 40.0, len(rec)))
+    names = [f"friction/{name}" for name in ("friction_map.csv", "bins.csv", "friction_map.json", "friction_map.png")]
+    assert capsys.readouterr().out == "\n".join([told.summary(), *(f"written: {name}" for name in names)]) + "\n"
+    told.to_csv("held.csv", "plateaus")
+    assert Path("held.csv").read_text() == Path(names[0]).read_text() and Path(names[3]).read_bytes()[:4] == b"\x89PNG"
+    assert len(Path(names[1]).read_text().splitlines()) == 1 + 8 and json.loads(Path(names[2]).read_text())["law"]
+    assert main(["map", *SPEEDS_LOG, "--axis", "linear", "--json"]) == 0
+    data = json.loads(capsys.readouterr().out)
+    assert data["schema"] == "gaident/friction_map" and data["law"]["viscous"]["unit"] == "N s/m"
+
+
+@pytest.mark.parametrize(
+    ("more", "message"),
+    [(["--inertia", "-1"], "inertia is -1"), (["--bins", "0"], "bins is 0"), (["--temperature", "x"], "no column 'x'"),
+     (["--column", "torque=,command=M"], "there is no torque, which shows the friction: name its column (--columns torque=...)"),
+     (["--out", "speeds.csv"], "speeds.csv")],
+)  # fmt: skip
+def test_map_says_what_is_wrong(
+    more: list[str], message: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    write_speeds()
+    assert main(["map", *SPEEDS_LOG, *more]) in (1, 2)
+    said = capsys.readouterr().err
+    assert message in said and said.count("\n") == 1
 
 
 @pytest.mark.parametrize(

@@ -21,7 +21,7 @@ pytestmark = pytest.mark.long
 
 RPM = np.pi / 30.0
 RATED = 9.84e-3  # N m
-PAGE = (ROOT / "docs" / "how-to" / "friction-map.md").read_text(encoding="utf-8")
+PAGE = (ROOT / "docs/how-to/friction-map.md").read_text(encoding="utf-8")
 
 Vector = NDArray[np.float64]
 

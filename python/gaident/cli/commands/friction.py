@@ -38,9 +38,8 @@ def map_command(args: argparse.Namespace) -> None:
             bar.doing(f"reading {log}")
             for rec in drive.records(log):
                 if rec.torque is None:
-                    raise SettingsError(
-                        f"{log}: there is no torque, whose friction is asked for: name its column (--columns torque=...)"
-                    )
+                    remedy = "name its column (--columns torque=...)"
+                    raise SettingsError(f"{log}: there is no torque, which shows the friction: {remedy}")
                 records.append(rec)
                 temperatures.append(None if args.temperature is None else _temperature(drive, log, args.temperature, rec))
         bar.doing("looking for held speeds")

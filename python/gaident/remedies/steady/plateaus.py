@@ -68,6 +68,10 @@ class Plateau:
         Samples.
     temperature : float
         Mean temperature, in the unit it was given in; nan where there is none.
+
+    See Also
+    --------
+    friction_map : Makes it.
     """
 
     record: str
