@@ -189,6 +189,17 @@ def test_what_the_plateaus_cannot_tell_is_said_with_the_speeds_that_would() -> N
     assert none.law is None and not none.plateaus and any(n.startswith("No speed is held, for 20 lines") for n in none.notes)
 
 
+def test_torques_without_noise_and_of_the_wrong_sign_are_taken() -> None:
+    w = np.repeat([1.0, 2.0, 5.0, 10.0, -10.0, -5.0, -2.0, -1.0], 60)
+    exact = ga.friction_map(ga.Record(DT, velocity=w, torque=0.1 * np.sign(w) + 0.01 * w))
+    assert exact.law is not None and exact.law.effects["coulomb_friction"]["torque"].value == pytest.approx(0.1, rel=1e-6)
+    assert "Held speeds" in exact.summary() and len(exact.plateaus) == 8
+    nothing = ga.friction_map(ga.Record(DT, velocity=w, torque=0.0 * w))
+    assert nothing.law is None and len(nothing.plateaus) == 8 and "Held speeds" in nothing.summary()
+    turned = ga.friction_map(ga.Record(DT, velocity=w, torque=-0.1 * np.sign(w)))
+    assert any("against the motion" in n and "check its sign" in n for n in turned.notes)
+
+
 def test_a_temperature_is_regressed_beside_the_law() -> None:
     def run(heat: float, seed: int) -> ga.Record:
         rec = stairs((*BOTH[:8:2], *BOTH[8::2]), seed, ramp=40)

@@ -43,6 +43,7 @@ RANK = 1e-6  # no decision: exact to so much, columns that depend on each other 
 SNAP = 1e-3  # no decision: exact to; deviations of the plateaus, by which a number near its bound is as good as there
 DIGITS = 6  # no decision: rounding; of BIC units, behind which two laws that are the same at these speeds may differ
 HALVINGS = 60  # no decision: exact to the last digit of a number
+EXACT = 1e-9  # no decision: exact to so much of the largest one, a torque that a log holds without any noise
 TINY = 1e-300  # no decision: no division by 0
 
 
@@ -171,11 +172,13 @@ def laws_of(plateaus: Sequence[Plateau]) -> Fitted:
     """The laws within the margin of the best, but for those that only add to a better one; none of plateaus of one speed."""
     w, torque, std = (np.array([getattr(p, name) for p in plateaus]) for name in ("velocity", "torque", "std"))
     speeds = len(speeds_of(plateaus))
-    if speeds < 2:
+    if speeds < 2 or not np.any(torque):
         return Fitted()
     scales = _scales(w, torque)
-    std = np.maximum(std, TINY)
+    std = np.maximum(std, EXACT * scales.torque)
     fits = _all(w, torque, std, scales, speeds, {})
+    if not fits:
+        return Fitted()
     general = max(fits, key=lambda law: (len(law.x), -law.chi2))
     beyond = _beyond(general, w, torque, std, scales)
     if beyond > 0.0:
@@ -244,7 +247,8 @@ def _all(w: Vector, torque: Vector, std: Vector, scales: Scales, speeds: int, ne
         else:
             starts = [np.zeros(1)]
         done[names] = law = _fitted(rows, starts, w, torque, std, scales)
-        if _full_rank(law.slopes(w, scales) / std[:, None]):
+        steps = (scales.torque / scales.speed, *(step for row in rows for step in row.steps(scales)))
+        if _full_rank(law.slopes(w, scales) * steps / std[:, None]):
             told.append(law)
     return told
 
@@ -283,7 +287,7 @@ def _fitted(rows: tuple[Cause, ...], starts: Sequence[Vector], w: Vector, torque
 
 
 def _full_rank(slopes: Matrix) -> bool:
-    """Whether the plateaus tell all numbers of a law, (N, k) in deviations."""
+    """Whether the plateaus tell all numbers of a law: (N, k), in deviations for a change of each number that matters."""
     sizes = np.linalg.norm(slopes, axis=0)
     return bool(np.all(sizes > RANK) and np.linalg.svd(slopes / sizes, compute_uv=False)[-1] > RANK)
 
@@ -360,7 +364,7 @@ def _slope(law: _Law, plateaus: Sequence[Plateau], w: Vector, torque: Vector, st
         return None
     column = np.where(seen, np.sign(w) * (heat - np.mean(heat[seen])), 0.0)
     slopes = np.column_stack([law.slopes(w, scales), column]) / std[:, None]
-    if len(w) <= slopes.shape[1] or not _full_rank(slopes):
+    if len(w) <= slopes.shape[1] or not _full_rank(slopes / np.linalg.norm(slopes, axis=0)):
         return None
     free = np.append(_free(law, scales), True)
     left = (torque - law.torque(w, law.x)) / std

@@ -4,12 +4,13 @@
     a      = slope of w over the stretch        the mean torque of the acceleration is J (w_end - w_start)/T exactly
     std^2  = var(u)/n_eff + (J std(a))^2        n_eff independent samples: noise and cogging are alike from line to line
 
-With s the velocity's running mean, and sigma the deviation of neighbouring means, a speed v is held
+With s the running mean of the velocity, over a 400th of the record, at least smoothed_samples and at most held_samples, and sigma
+the deviation of neighbouring means, a speed v is held
 
     (1) while all s lie within v +- width/2,    width = max(2 still |v|, above_noise sigma)
     (2) and its halves, and its middle and its ends, differ by less than no_ramp width: the longest such stretch of a ramp, or of
         a turning point, fills the width, so that they differ by half of it, whatever the inertia
-    (3) for held_samples at least, in one direction: all s have the sign of v, |v| is above a step of the sensor and above_noise
+    (3) for held_samples at least, in one direction: all s have the sign of v, |v| is above half a sensor's step and above_noise
         deviations of a mean, and a logged position moves by half of v T at least: at rest a sensor may show some velocity
     (4) and, where J is known, |J a| < check_torque |mean(u)|
 
@@ -95,7 +96,7 @@ class LeftOut(NamedTuple):
 def plateaus_of(rec: Record, name: str, inertia: float | None, temperature: Vector) -> tuple[list[Plateau], LeftOut]:
     """The held speeds of a record in their order; temperature (n,), nan where there is none."""
     assert rec.torque is not None
-    width = max(POLICY.smoothed_samples, len(rec) // POLICY.smoothed_parts)
+    width = min(max(POLICY.smoothed_samples, len(rec) // POLICY.smoothed_parts), POLICY.held_samples)
     smooth = _running_mean(rec.velocity, width)
     step, rounding = lattice_step(rec.velocity), lattice_step(rec.torque)
     found, sticking, accelerating = [], 0, 0
@@ -105,7 +106,7 @@ def plateaus_of(rec: Record, name: str, inertia: float | None, temperature: Vect
         here = slice(start, stop)
         w, u = rec.velocity[here], rec.torque[here]
         speed = float(np.mean(w))
-        still = abs(speed) <= max(step, POLICY.above_noise * float(np.std(w)) / np.sqrt(effective_samples(w)))
+        still = abs(speed) <= max(step / 2, POLICY.above_noise * float(np.std(w)) / np.sqrt(effective_samples(w)))
         if still or (rec.position is not None and _stays(rec.position[here], speed * rec.dt)):
             continue
         if not np.all(np.sign(speed) * smooth[here] > 0.0):

@@ -30,9 +30,11 @@ def notes_of(
     if not plateaus:
         text = "No speed is held, for {} lines at least, so that no law of friction is told. Hold speeds, both ways: {} {rad/s}."
         found.append(say(text, POLICY.held_samples, _proposed(top)))
-    elif not fitted.laws:
+    elif len(speeds) < 2:
         text = "The one speed that is held, {} {rad/s}, tells no law of friction. Hold others too, both ways: {} {rad/s}."
         found.append(say(text, number(speeds[0]), _proposed(max(top, speeds[0]))))
+    if sum(p.torque * np.sign(p.velocity) for p in plateaus) < 0.0:
+        found.append(say("At held speeds the {torque} is against the motion, which no friction asks for: check its sign."))
     if len(ways) == 1:
         text = (
             "Speeds are held in one direction: dry friction and a constant {torque}, as of a load or gravity, are one there. "
@@ -99,7 +101,8 @@ def _speeds(plateaus: Sequence[Plateau], laws: Sequence[FrictionLaw], axis: str)
     head = f"{word('torque', axis)} [{torque}]"
     rows: list[tuple[str, ...]] = [(f"velocity [{unit('rad/s', axis)}]", head, "plateaus", f"law [{torque}]" if laws else "")]
     for group in _groups(plateaus):
-        weights = 1.0 / np.maximum([p.std for p in group], np.finfo(float).tiny) ** 2
+        least = np.finfo(float).eps * max(abs(p.torque) for p in group) or 1.0  # of a torque without any noise
+        weights = 1.0 / np.maximum([p.std for p in group], least) ** 2
         weights /= np.sum(weights)
         velocity, mean = (float(weights @ [getattr(p, name) for p in group]) for name in ("velocity", "torque"))
         std = float(np.sqrt(np.sum((weights * [p.std for p in group]) ** 2)))
