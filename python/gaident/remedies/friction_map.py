@@ -43,6 +43,7 @@ Matrix = NDArray[np.float64]
 
 BINS = 12  # no decision: a grid: bins of a direction, where nobody asks for others
 HELD = ("record", "start", "stop", "velocity", "torque", "std", "independent", "samples", "temperature")
+HOTTEST = 1e6  # no decision: what an argument may be
 FEWEST, MOST = 1, 1000  # no decision: what an argument may be
 
 
@@ -205,6 +206,8 @@ class FrictionMap:
         from gaident.remedies.pictures import plot_friction
 
         rows = tuple(zip(self.names, self.torque, self.scatter, strict=True))
+        if self.plateaus and not np.isfinite(self.inertia):  # the acceleration is in the bins
+            rows = ()
         return plot_friction(self.velocity, rows, self.axis if axis is None else axis, self.plateaus, self._laws)
 
 
@@ -326,8 +329,10 @@ def _temperatures(given: Any, records: Sequence[Record], alone: bool) -> list[Ve
     for rec, part in zip(records, parts, strict=True):
         try:
             values = np.asarray(np.nan if part is None else part, dtype=np.float64)
-        except (TypeError, ValueError):
+        except (TypeError, ValueError, OverflowError):
             raise SettingsError(f"temperature is {part!r:.60}: {remedy}") from None
+        if np.any(np.abs(values) > HOTTEST):
+            raise SettingsError(f"temperature has {np.nanmax(np.abs(values)):g}, which nothing has: {remedy}")
         if values.shape not in ((), (len(rec),)):
             raise SettingsError(f"temperature has the shape {values.shape} for a record of {len(rec)} samples: {remedy}")
         found.append(np.broadcast_to(values, (len(rec),)).astype(np.float64))

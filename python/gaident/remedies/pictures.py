@@ -21,6 +21,7 @@ from gaident.show.draw import new_figure
 from gaident.show.report.views import LoopCurves
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 __all__ = ["loop_curves", "plot_friction", "plot_retuning"]
@@ -39,38 +40,43 @@ def plot_friction(
     plateaus: Sequence[Plateau] = (),
     laws: Sequence[FrictionLaw] = (),
 ) -> Figure:
-    """Torque over the velocity, a line with the scatter of its bins for each record: (name, mean, scatter).
+    """Torque over the velocity, a line with the scatter of its bins for each record: (name, mean, scatter); no rows: left out.
 
     Beside it, where speeds are held, those with their deviations, the law and the best of its rivals.
     """
-    figure = new_figure(8.0 if not plateaus else 12.0, 5.0)
-    ax, *others = figure.subplots(1, 2 if plateaus else 1, squeeze=False)[0]
-    named = len(rows) <= NAMED
-    for name, mean, scatter in rows:
-        ax.errorbar(velocity, mean, scatter, marker=".", capsize=2.0, label=name if named else None)
-    ax.set_ylabel(said(say("{torque} without that of the {inertia}"), axis) + f" [{unit('N m', axis)}]")
-    if named:
-        ax.legend()
-    for other in others:
-        for name in dict.fromkeys(p.record for p in plateaus):
-            own = [p for p in plateaus if p.record == name]
-            points = zip(*((p.velocity, p.torque, p.std) for p in own), strict=True)
-            other.errorbar(*points, fmt=".", capsize=2.0, label=name if named else None)
-        fastest = max(abs(p.velocity) for p in plateaus)
-        ways = sorted({float(np.sign(p.velocity)) for p in plateaus})
-        for law, style in zip(laws, STYLES, strict=False):
-            label: str | None = said(law.name, axis)
-            for way in ways:
-                w = way * np.linspace(LOWEST, 1.0, CURVE) * fastest
-                other.plot(w, law.torque(w), style, color="black", linewidth=1.0, label=label)
-                label = None
-        other.set_ylabel(said(say("{torque} at held speeds"), axis) + f" [{unit('N m', axis)}]")
-        if named or laws:
-            other.legend(fontsize="small")
-    for each in (ax, *others):
+    panels = [rows] * bool(rows) + [plateaus] * bool(plateaus)
+    figure = new_figure(8.0 if len(panels) < 2 else 12.0, 5.0)
+    axes = list(figure.subplots(1, len(panels), squeeze=False)[0])
+    named = len(rows) <= NAMED and len({p.record for p in plateaus}) <= NAMED
+    if rows:
+        ax = axes[0]
+        for name, mean, scatter in rows:
+            ax.errorbar(velocity, mean, scatter, marker=".", capsize=2.0, label=name if named else None)
+        ax.set_ylabel(said(say("{torque} without that of the {inertia}"), axis) + f" [{unit('N m', axis)}]")
+        if named:
+            ax.legend()
+    if plateaus:
+        _held_speeds(axes[-1], plateaus, laws, axis, named)
+    for each in axes:
         each.axhline(0.0, color="black", linewidth=0.5)
         each.set_xlabel(f"velocity [{velocity_unit(axis)}]")
     return figure
+
+
+def _held_speeds(ax: Axes, plateaus: Sequence[Plateau], laws: Sequence[FrictionLaw], axis: str, named: bool) -> None:
+    for name in dict.fromkeys(p.record for p in plateaus):
+        w, torque, std = zip(*((p.velocity, p.torque, p.std) for p in plateaus if p.record == name), strict=True)
+        ax.errorbar(w, torque, std, fmt=".", capsize=2.0, label=name if named else None)
+    fastest = max(abs(p.velocity) for p in plateaus)
+    for law, style in zip(laws, STYLES, strict=False):
+        label: str | None = said(law.name, axis)
+        for way in sorted({float(np.sign(p.velocity)) for p in plateaus}):
+            speeds = way * np.linspace(LOWEST, 1.0, CURVE) * fastest
+            ax.plot(speeds, law.torque(speeds), style, color="black", linewidth=1.0, label=label)
+            label = None
+    ax.set_ylabel(said(say("{torque} at held speeds"), axis) + f" [{unit('N m', axis)}]")
+    if named or laws:
+        ax.legend(fontsize="small")
 
 
 def loop_curves(result: Retuning) -> tuple[LoopCurves, LoopCurves]:

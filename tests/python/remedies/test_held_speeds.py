@@ -254,6 +254,8 @@ def test_held_speeds_without_an_inertia_are_mapped() -> None:
     assert np.isnan(found.inertia) and any(n.startswith("The records show no inertia") for n in found.notes)
     assert found.law is not None and found.law.effects["coulomb_friction"]["torque"].value == pytest.approx(0.05, abs=2e-3)
     assert "half of the difference" not in found.summary(), "its bins contain the acceleration"
+    (only,) = found.plot().axes
+    assert "held speeds" in only.get_ylabel() and len(only.containers) == 6
 
 
 @pytest.mark.long

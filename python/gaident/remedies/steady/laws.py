@@ -43,7 +43,7 @@ RANK = 1e-6  # no decision: exact to so much, columns that depend on each other 
 SNAP = 1e-3  # no decision: exact to; deviations of the plateaus, by which a number near its bound is as good as there
 DIGITS = 6  # no decision: rounding; of BIC units, behind which two laws that are the same at these speeds may differ
 HALVINGS = 60  # no decision: exact to the last digit of a number
-EXACT = 1e-9  # no decision: exact to so much of the largest one, a torque that a log holds without any noise
+EXACT = 1e-9  # no decision: exact to so much of the largest one, a torque or a temperature that a log holds without noise
 TINY = 1e-300  # no decision: no division by 0
 
 
@@ -360,7 +360,7 @@ def _slope(law: _Law, plateaus: Sequence[Plateau], w: Vector, torque: Vector, st
     """c of c sign(w) (temperature - mean), regressed beside the numbers of the law [N m to a degree]."""
     heat = np.array([p.temperature for p in plateaus])
     seen = np.isfinite(heat)
-    if not np.any(seen) or np.ptp(heat[seen]) == 0.0:
+    if not np.any(seen) or np.ptp(heat[seen]) <= EXACT * float(np.max(np.abs(heat[seen]))):
         return None
     column = np.where(seen, np.sign(w) * (heat - np.mean(heat[seen])), 0.0)
     slopes = np.column_stack([law.slopes(w, scales), column]) / std[:, None]
