@@ -19,8 +19,9 @@ z is found by steps of Gauss and Newton, after each of which x is fitted again (
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, MutableMapping
 from dataclasses import replace
+from weakref import WeakKeyDictionary
 
 import numpy as np
 from numpy.typing import NDArray
@@ -77,10 +78,22 @@ def under_other(data: DataSet, here: Controller, there: Controller, found: Found
     return replace(data, controller=limited, driven=driven, free=freed(data.records, driven), found=found)
 
 
+_MADE: MutableMapping[Record, dict[Controller, Vector]] = WeakKeyDictionary()
+KEPT = 4  # no decision: torques of one record that are kept, one for each of the last controllers: moves begin at the same one
+
+
 def _made(rec: Record, controller: Controller) -> Vector:
     """The torque over each line [N m], as this controller makes it where the record has none, or fewer lines than it samples."""
-    pi = bare_pi(controller)
-    return torque_of(rec, pi) if pi is not None else torque_in(driven_by(rec, controller))
+    kept = _MADE.setdefault(rec, {})
+    made = kept.pop(controller, None)
+    if made is None:
+        pi = bare_pi(controller)
+        made = torque_of(rec, pi) if pi is not None else torque_in(driven_by(rec, controller))
+        made.flags.writeable = False
+    kept[controller] = made  # the last one that was asked for
+    while len(kept) > KEPT:
+        kept.pop(next(iter(kept), controller), None)
+    return made
 
 
 def _joined(data: DataSet) -> DataSet:

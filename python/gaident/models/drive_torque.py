@@ -54,10 +54,12 @@ def driven_by(rec: Record, controller: Controller, made: Vector | None = None) -
     every = controller.log_every(rec.dt)
     torque = made_by(rec, controller) if rec.torque is None else rec.torque
     whole = rec.with_channels(torque=torque)
-    stored = stored_torque(whole, controller, driven=False)
+    from_rest = made_at_its_clock(whole, controller) if every > 1 else None
+    stored = stored_torque(whole, controller, driven=False, at_clock=from_rest)
     before = torque_before(whole, stored)
     if every > 1:
-        at_clock = _at_its_clock(rec, torque, controller, stored, made).reshape(len(rec), every)
+        known = from_rest if made is None and stored == 0.0 else made
+        at_clock = _at_its_clock(rec, torque, controller, stored, known).reshape(len(rec), every)
         torque = _mean_ahead(torque, at_clock) if rec.torque_log == MEAN else at_clock.mean(axis=1)
     return rec.with_channels(torque=late(torque, controller.delay / rec.dt, before), torque_log=HELD)
 

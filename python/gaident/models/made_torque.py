@@ -46,12 +46,13 @@ CUT = 2.0  # no decision: a formula: lines, the one that was cut and the first o
 PARTS = 20  # no decision: of a record, the longer of the two spans; from 5 to 80, a level is off by as much
 
 
-def stored_torque(rec: Record, controller: Controller, driven: bool = True) -> float:
+def stored_torque(rec: Record, controller: Controller, driven: bool = True, at_clock: Vector | None = None) -> float:
     """What the integrator stored before a record [N m], for a load; 0 where nothing shows it.
 
     driven: whether the torque is as `driven_by` makes it, the mean over each line; else it is the controller's as the log has it.
+    at_clock: what `made_at_its_clock` makes from rest, where it is known.
     """
-    made = _from_rest(rec, controller, driven)
+    made = _from_rest(rec, controller, driven, at_clock)
     return 0.0 if rec.torque is None or made is None else stored_beside(rec.torque, made, controller)
 
 
@@ -90,12 +91,12 @@ def _first_level(off: Vector) -> float:
     return float(np.average(off, weights=kept ** np.arange(len(off))))
 
 
-def _from_rest(rec: Record, controller: Controller, driven: bool) -> Vector | None:
+def _from_rest(rec: Record, controller: Controller, driven: bool, at_clock: Vector | None) -> Vector | None:
     """What the controller makes of the record from rest [N m] (n,); None where the record lacks what it reads."""
     pi = bare_pi(controller)
     if pi is not None:
         return None if rec.command is None else pi_torque(rec.command, rec.velocity, rec.dt, pi)
-    made = made_at_its_clock(rec, controller)
+    made = made_at_its_clock(rec, controller) if at_clock is None else at_clock
     if made is None:
         return None
     if not driven:

@@ -14,6 +14,7 @@ import gaident.identification.replay.replay as replay_module
 from friction_drive import CONTROLLER, DRIVE, DT, drive_record
 from gaident.control.pi_torque import held_torque
 from gaident.diagnosis.controller.as_read import outliers_of_the_log
+from gaident.diagnosis.controller.form_findings import driver_of, loop_of
 from gaident.diagnosis.records.hygiene import outliers
 from gaident.identification.replay.replay import Replay, replay
 from gaident.models.starts import noise_std
@@ -48,6 +49,28 @@ def limited_drive(limit: float, hold: str = "", hum: float = 0.0, step: float = 
         torques.append(u)
         w = decay * w + (1.0 - decay) * (u + hum * math.sin(math.tau * 37.0 * n * DT)) / D
     return ga.Record(DT, command=LEVELS, velocity=np.array(seen), torque=np.array(torques))
+
+
+def test_a_velocity_that_the_log_alone_has_noise_on_asks_for_no_form_of_controller() -> None:
+    """The controller read a velocity without it: its torque follows from one that is off by white noise."""
+    seen = limited_drive(math.inf)
+    off = 0.03 * np.random.default_rng(3).standard_normal(len(seen))
+    rec = seen.with_channels(velocity=seen.velocity + off)
+    told = replay(rec, CONTROLLER)
+    assert told.follows is False and not told.cause
+    assert told.velocity_noise == pytest.approx(float(np.std(off)), rel=0.05)
+    assert "off the logged one by white noise" in told.sentence
+    found = loop_of([rec], CONTROLLER)
+    assert found.controller == CONTROLLER and found.at_rate and not found.findings
+    assert driver_of([rec], [], CONTROLLER) is None
+
+
+def test_a_filter_of_the_controller_is_no_noise_of_the_log() -> None:
+    seen = limited_drive(math.inf)
+    filtered = ga.Cascade(CONTROLLER, velocity_filters=(ga.LowPass(2e-3),))
+    rec = seen.with_channels(torque=filtered.torque_of(seen), velocity=seen.velocity)
+    assert replay(rec, CONTROLLER).velocity_noise == 0.0
+    assert replay(seen, ga.PI(1.2 * CONTROLLER.kp, CONTROLLER.ki)).velocity_noise == 0.0
 
 
 def test_corners_impacts_tops_and_delays_are_no_outliers() -> None:

@@ -46,8 +46,9 @@ def compared(
     unknown: tuple[str, ...],
     unsure: Unsure | None = None,
     near: Shape | None = None,
+    most: int = 2,
 ) -> list[FormCandidate]:
-    """Every form with every set of filters that is needed, the best first.
+    """Every form with every set of at most so many filters that is needed, the best first.
 
     unsure: jumps between the lines of unknown times; of two filters then only those of `near` are tried, from its numbers.
     """
@@ -55,6 +56,8 @@ def compared(
     followed: int | None = None
     two = () if near is None or near.places in FILTER_SETS_OF_ONE else (near.places,)
     for places in FILTER_SETS if unsure is None else (*FILTER_SETS_OF_ONE, *two):
+        if len(places) > most:
+            break
         if followed is not None and len(places) > followed:
             break  # where only rounding or white noise is left, another filter improves nothing
         if unsure is not None:

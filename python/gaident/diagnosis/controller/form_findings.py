@@ -75,7 +75,7 @@ def driver_of(
     if given is None or given.loop != "sampled" or any(r.torque is None or r.command is None for r in records):
         return None
     replays = [replay(r, given) for r in records]
-    if all(r.follows for r in replays) or any(r.cause not in ("", "initial_integral") for r in replays):
+    if all(r.follows or r.velocity_noise for r in replays) or any(r.cause not in ("", "initial_integral") for r in replays):
         return None
     shown = form_shown(records, given, tuple(name for name in unknown if name in ("kp", "ki")))
     if shown is None:
@@ -109,13 +109,25 @@ def loop_of(records: Sequence[Record], given: Controller | None) -> Loop:
     """The controller with estimates for what is None and, where a log has fewer lines than a bare PI in a Cascade has samples,
     in the form that the logged torque shows."""
     records = timed(records, given)
-    if _has_a_law(records, given):
+    if _noise_of_the_log(records, given) or _has_a_law(records, given):
         return replace(_loop_of(records, given), at_rate=True)
     period = period_shown(records, given)
     if period is None or period.controller is given:  # none, or no sure one
         period = _formed(records, given) or period
     found = _loop_of(records, given if period is None else period.controller)
     return found if period is None else replace(found, period_notes=(period.note,))
+
+
+def _noise_of_the_log(records: Sequence[Record], given: Controller | None) -> bool:
+    """Whether the torque of a bare PI follows from velocities off by white noise, where it does not from the logged ones.
+
+    A form of controller, or a faster one, would fit that noise.
+    """
+    pi = bare_pi(given)
+    if pi is None or pi.unknown or pi.loop != "sampled" or any(r.torque is None or r.command is None for r in records):
+        return False
+    replays = [replay(r, pi) for r in records]
+    return not all(r.follows for r in replays) and all(r.follows or r.velocity_noise for r in replays)
 
 
 def _has_a_law(records: Sequence[Record], given: Controller | None) -> bool:
@@ -146,7 +158,7 @@ def _formed(records: Sequence[Record], given: Controller | None) -> Period | Non
     unsaid = [(r, said) for r in records if (said := replay(r, pi)).follows is False]
     if not unsaid or any(said.cause not in ("", "gains") for _, said in unsaid):
         return None
-    found = {every: shown for every in FASTER if (shown := form_shown(records, pi, (), every, between=False)) is not None}
+    found = {every: shown for every in FASTER if (shown := form_shown(records, pi, (), every, between=False, most=1))}
     gains = [(r, said.controller) for r, said in unsaid if said.controller is not None and said.cause == "gains"]
     if len(gains) == len(unsaid):
         left = max(run_error([r], Cascade(c, dt)) / run_error([r], Cascade(pi, dt)) for r, c in gains)

@@ -96,19 +96,20 @@ def form_shown(
     every: int = 1,
     between: bool = True,
     around: Cascade | None = None,
+    most: int = 2,
 ) -> Shown | None:
     """The simplest controller that makes the logged torques; None where none does, or where the given PI makes them.
 
     unknown: gains of `given` that were not given but estimated. every: controller samples to a line of the log.
     between: whether the command may have jumped between the lines, at times that are found with the form.
-    around: the position controller of a slower log, with the feedforwards that were given.
+    around: the position controller of a slower log, with the feedforwards that were given. most: filters of a form.
     """
     if given.loop != "sampled" or any(r.dt != records[0].dt for r in records):
         return None
     shown = []
     for steps in velocity_steps(records) if every == 1 else ((),):
         regression = law_of(records, given, every, steps, around)
-        found = None if regression is None else _form_of(records, given, unknown, *regression, between)
+        found = None if regression is None else _form_of(records, given, unknown, *regression, between, most)
         if found is not None and found.exact:
             return found
         shown.append(found)
@@ -117,10 +118,10 @@ def form_shown(
 
 
 def _form_of(
-    records: Sequence[Record], given: PI, unknown: tuple[str, ...], law: Law, floor: float, between: bool
+    records: Sequence[Record], given: PI, unknown: tuple[str, ...], law: Law, floor: float, between: bool, most: int
 ) -> Shown | None:
     """The same for one assumption on the log's rounding."""
-    candidates = compared(law, given, floor, unknown)
+    candidates = compared(law, given, floor, unknown, most=most)
     if not candidates:
         return None
     if law.every > 1:

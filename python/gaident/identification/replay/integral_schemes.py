@@ -25,6 +25,7 @@ from numpy.typing import NDArray
 
 from gaident.control.cascade import Cascade
 from gaident.control.pi import PI, RULES
+from gaident.control.simplest import simplest
 from gaident.control.smoothing import expected_at
 from gaident.control.ticks import straight_between
 from gaident.data.record import Record
@@ -178,7 +179,8 @@ def _shown(records: Sequence[Record], controller: Cascade) -> SchemeShown | None
     told = tells_of_controller if at_rate else comparable
     if not plain or any(r.torque_log == MEAN or not told(r, bare) for r in records):
         return None
-    if at_rate and all(replay(r, controller).follows or replay(r, controller).cause for r in records):
+    alone = simplest(controller, (r.dt for r in records))
+    if at_rate and all(one.follows or one.cause or one.velocity_noise for one in (replay(r, alone) for r in records)):
         return None
     closer = not at_rate and not not_followed(records, controller)
     if closer and controller.velocity.anti_windup != "hold":

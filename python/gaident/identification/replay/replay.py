@@ -23,7 +23,7 @@ from gaident.control.pi import PI, bare_pi
 from gaident.data.record import Record
 from gaident.data.signals.lattice import digits_step, lattice_step, place_step, rounding_step
 from gaident.errors import RecordError
-from gaident.identification.replay.causes import Explanation, explain, rounded_command, under_load, white_noise
+from gaident.identification.replay.causes import Explanation, control_error, explain, rounded_command, under_load, white_noise
 from gaident.models.made_torque import stored_torque
 from gaident.policy.table import POLICY
 
@@ -53,6 +53,8 @@ class Replay:
     departs     first sample at which the configured controller departs from the log; None: it does not
     sentence    all this in words
     controller  as the log shows it, where a PI has what differs: gains and limits; else None
+    velocity_noise  standard deviation of the white noise [rad/s] by which a velocity from which the torque of a PI follows is off
+                the logged one; 0: none tells so
     """
 
     torque: Vector
@@ -66,6 +68,7 @@ class Replay:
     departs: int | None
     sentence: Text
     controller: PI | None = None
+    velocity_noise: float = 0.0
 
 
 _KEPT: MutableMapping[Record, dict[Controller | None, Replay]] = WeakKeyDictionary()
@@ -148,6 +151,10 @@ def _compared(rec: Record, command: Vector, controller: Controller, logged: Vect
     if pi is None:
         text = say("{}. Is this the controller, and are these the signals it saw?", head)
         return Replay(*figures, False, "", np.nan, departs, text)
+    error = control_error(off, pi, rec.dt)
+    if error is not None and (noise := white_noise(error, rec.velocity)):
+        text = say("{}. It does from a velocity that is off the logged one by white noise of {:.2g} {rad/s} rms.", head, noise)
+        return Replay(*figures, False, "", np.nan, departs, text, velocity_noise=noise)
     text = say(
         "{}, and none of the simple reasons explains it (start of the integrator, gains, scale, sign, rule of integration, "
         "shift by samples, limits). Is this the controller, and are these the signals it saw? Of one that samples faster than "
