@@ -22,12 +22,12 @@ const char* name_of(Place place) {
 py::list table() {
     py::list rows;
     for (const EffectInfo& info : effect_table) {
-        if (info.at_load) continue;  // as at the motor
+        if (info.at_load || info.several_waves) continue;  // as at the motor, and as one wave
         py::list parameters;
         for (const EffectParameter& p : info.parameters)
             parameters.append(py::make_tuple(p.name, p.unit, p.neutral, p.lowest, p.highest, p.above_lowest));
         rows.append(py::make_tuple(info.name, name_of(info.place), info.meaning, py::tuple(parameters), info.simulated,
-                                   info.needs_two_masses, info.relation, info.remark, info.turns));
+                                   info.needs_two_masses, info.relation, info.remark, info.turns, waves_of(info)));
     }
     return rows;
 }

@@ -284,9 +284,9 @@ def discrete(
     """(alpha, beta) of equation (7), powers of z^-1."""
 
 def effect_table() -> list[
-    tuple[str, str, str, tuple[tuple[str, str, float, float, float, bool], ...], bool, bool, str, str, bool]
+    tuple[str, str, str, tuple[tuple[str, str, float, float, float, bool], ...], bool, bool, str, str, bool, int]
 ]:
-    """(name, place, meaning, parameters, simulated, needs two masses, relation, remark, turns) of every effect, at the motor."""
+    """(name, place, meaning, parameters, simulated, needs two masses, relation, remark, turns, waves at most) of every effect."""
 
 def broken_relation(name: str, values: Sequence[float]) -> str:
     """The relation between an effect's parameters that these values break, or ""."""

@@ -43,6 +43,15 @@ struct Drive {  // SI units, rad; neutral values
     double ripple = 0;
     double ripple_order = 1;
     double ripple_phase = 0;
+    double ripple_2 = 0;  // further waves of it
+    double ripple_order_2 = 1;
+    double ripple_phase_2 = 0;
+    double ripple_3 = 0;
+    double ripple_order_3 = 1;
+    double ripple_phase_3 = 0;
+    double ripple_4 = 0;
+    double ripple_order_4 = 1;
+    double ripple_phase_4 = 0;
     double quantum = 0;            // rad/s
     double differenced = 0;        // not 0: the encoder's own angle is differenced, half a sample late
     double encoder = 0;            // rad
@@ -70,6 +79,15 @@ struct Drive {  // SI units, rad; neutral values
     double cogging = 0;
     double cogging_order = 2;
     double cogging_phase = 0;
+    double cogging_2 = 0;  // further waves of it
+    double cogging_order_2 = 2;
+    double cogging_phase_2 = 0;
+    double cogging_3 = 0;
+    double cogging_order_3 = 2;
+    double cogging_phase_3 = 0;
+    double cogging_4 = 0;
+    double cogging_order_4 = 2;
+    double cogging_phase_4 = 0;
     double gap = 0;    // rad
     double cubic = 0;  // N m/rad3
     double wp = 0;     // rad/s; 0: no extra resonance
@@ -175,6 +193,9 @@ struct End {
         }
         if (d.unbalance != 0) q -= d.unbalance * std::sin(turned(x) + d.unbalance_phase);
         if (d.cogging != 0) q -= d.cogging * std::sin(d.cogging_order * turned(x) + d.cogging_phase);
+        if (d.cogging_2 != 0) q -= d.cogging_2 * std::sin(d.cogging_order_2 * turned(x) + d.cogging_phase_2);
+        if (d.cogging_3 != 0) q -= d.cogging_3 * std::sin(d.cogging_order_3 * turned(x) + d.cogging_phase_3);
+        if (d.cogging_4 != 0) q -= d.cogging_4 * std::sin(d.cogging_order_4 * turned(x) + d.cogging_phase_4);
         if (d.hum != 0) q += d.hum * std::sin(6.283185307179586477 * d.hum_frequency * t + d.hum_phase);
         if (d.root != 0) q -= d.root * std::sqrt(std::abs(x[speed])) * sign(x[speed]);
         return q;
@@ -225,7 +246,11 @@ private:
     double rippled(const State& x) const {
         if (d.ripple == 0 && d.resolver == 0) return x[w1];
         const double error = d.resolver * std::abs(x[w1]) * d.resolver_order;
-        return x[w1] * (1 + d.ripple * d.ripple_order * std::cos(d.ripple_order * x[angle] + d.ripple_phase) +
+        double further = 0;
+        if (d.ripple_2 != 0) further += d.ripple_2 * d.ripple_order_2 * std::cos(d.ripple_order_2 * x[angle] + d.ripple_phase_2);
+        if (d.ripple_3 != 0) further += d.ripple_3 * d.ripple_order_3 * std::cos(d.ripple_order_3 * x[angle] + d.ripple_phase_3);
+        if (d.ripple_4 != 0) further += d.ripple_4 * d.ripple_order_4 * std::cos(d.ripple_order_4 * x[angle] + d.ripple_phase_4);
+        return x[w1] * (1 + further + d.ripple * d.ripple_order * std::cos(d.ripple_order * x[angle] + d.ripple_phase) +
                         error * std::cos(d.resolver_order * x[angle] + d.resolver_phase));
     }
 

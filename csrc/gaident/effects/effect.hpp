@@ -17,6 +17,7 @@
 //   - actuator            u' = actuator(c, u)                    the torque issued, once a control step [N m]
 //   - actuator_dynamics   T = actuator_dynamics(c, s, past, T)   its course over the substep [N m]
 //   - torque              T' = T - torque(c, theta)              a torque that brakes, at the angle theta [rad]
+//   - torque_apart        T' = T - torque_apart(c, theta)        the same in a call of its own, which no other effect pays for
 //   - torque_of_time      T' = T - torque_of_time(c, t)          one that is known by the time t [s] alone
 //   - inertia             inertia(c, theta, step)                what a change of the inertia does to the substep's equation; at the
 //                                                                load of two masses, else at the motor
@@ -29,6 +30,7 @@
 //   - coupling            coupling, mean_coupling, loaded_twist  a nonlinear coupling of two masses (mechanism.hpp)
 //   - hysteresis          wound, mean_wound, loaded_twist        a coupling of two masses with a memory (mechanism.hpp)
 //   - sensor              w' = sensor(c, theta, w)               the velocity as it is measured [rad/s]
+//   - sensor_apart        w' = sensor_apart(c, theta, w)         the same in a call of its own
 //   - sensor_dynamics     y = sensor_dynamics(c, s, w, bend)     the same filtered, once a substep, its output kept as s.output;
 //                                                                bend: by how much its mean over the substep is above that of its ends
 //   - reading             y' = reading(c, y)                     the number read from it, once a sample
@@ -87,6 +89,8 @@ enum class Hooks : std::uint32_t {
     hysteresis = 1U << 22,
     torque_of_time = 1U << 23,
     inertia = 1U << 24,
+    torque_apart = 1U << 25,
+    sensor_apart = 1U << 26,
 };
 constexpr Hooks operator|(Hooks a, Hooks b) {
     return static_cast<Hooks>(static_cast<std::uint32_t>(a) | static_cast<std::uint32_t>(b));
@@ -122,6 +126,7 @@ struct EffectInfo {
     const char* relation = "";                  // in words
     const char* remark = "";                    // what the table says after the meaning
     bool at_load = false;                       // acts at the load of two masses (at_load.hpp)
+    bool several_waves = false;                 // is another effect's with more waves than one (several_waves.hpp)
 
     constexpr int count() const { return static_cast<int>(parameters.size()); }
 

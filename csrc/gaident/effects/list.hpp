@@ -36,8 +36,13 @@
 
 #include "at_load.hpp"
 #include "registry.hpp"
+#include "several_waves.hpp"
 
 namespace gaident {
+
+// Those of which a model may have several waves.
+using CoggingWaves = SeveralWaves<Cogging>;
+using VelocityRippleWaves = SeveralWaves<VelocityRipple>;
 
 using Effects = EffectList<CoulombFriction,        //
                            StribeckFriction,       //
@@ -49,6 +54,7 @@ using Effects = EffectList<CoulombFriction,        //
                            LoadTorque,             //
                            Unbalance,              //
                            Cogging,                //
+                           CoggingWaves,           //
                            FrictionDrift,          //
                            LoadDependentFriction,  //
                            PositionFriction,       //
@@ -67,6 +73,7 @@ using Effects = EffectList<CoulombFriction,        //
                            VelocityObserver,       //
                            VelocityFilter,         //
                            VelocityRipple,         //
+                           VelocityRippleWaves,    //
                            VelocityQuantisation,   //
                            ExtraResonance,         //
                            Outliers>;
@@ -90,6 +97,16 @@ inline Effect effect_named(std::string_view name) {
     throw std::invalid_argument("effects: '" + std::string(name) + "' is no effect");
 }
 constexpr const EffectInfo& info_of(Effect e) { return effect_table[static_cast<std::size_t>(e)]; }
+
+// How many waves an effect may have in a model.
+constexpr std::size_t waves_of(const EffectInfo& info) {
+    const std::string_view name = info.name;
+    for (const EffectInfo& other : Effects::table)
+        if (other.several_waves && std::string_view(other.name).substr(0, name.size()) == name &&
+            other.count() == info.count() * static_cast<int>(most_waves))
+            return most_waves;
+    return 1;
+}
 
 // A set of effects; in a model each appears at most once at a side.
 struct EffectSet {
@@ -136,7 +153,7 @@ constexpr EffectSet load_effects_with(Hooks hooks) {
 }
 // Those that only the loop of several candidates has, see nonlinear/effect_run.hpp.
 constexpr EffectSet effects_in_lanes_only() {
-    EffectSet set = effects_with(Hooks::torque_of_time);
+    EffectSet set = effects_with(Hooks::torque_of_time | Hooks::torque_apart | Hooks::sensor_apart);
     AllEffects::each([&]<class E>() {
         if (Apart<E>) set.add(effect<E>);
     });
@@ -146,7 +163,7 @@ static_assert((effects_with(Hooks::actuator_dynamics | Hooks::sensor_dynamics).b
               "what has dynamics before or behind the mechanism stands apart: the loop of one candidate has no place for it");
 // Those whose output is known at the ends of a substep alone, and not its mean between them.
 constexpr EffectSet effects_known_at_ends() {
-    EffectSet set = effects_with(Hooks::sensor);
+    EffectSet set = effects_with(Hooks::sensor | Hooks::sensor_apart);
     AllEffects::each([&]<class E>() {
         if constexpr (hook::sensor_dynamics<E> && !hook::bend_behind<E>) set.add(effect<E>);
     });

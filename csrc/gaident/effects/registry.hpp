@@ -122,6 +122,8 @@ concept actuator_dynamics = requires(C<E> c, S<E> s, const Past& past, Course<do
 template <class E>
 concept torque = requires(C<E> c, double x) { E::torque(c, x); };
 template <class E>
+concept torque_apart = requires(C<E> c, double x) { E::torque_apart(c, x); };
+template <class E>
 concept torque_of_time = requires(C<E> c, double x) { E::torque_of_time(c, x); };
 template <class E>
 concept inertia = requires(C<E> c, FrictionStep<double>& step, double x) { E::inertia(c, x, step); };
@@ -152,6 +154,8 @@ concept hysteresis = requires(C<E> c, S<E> s, double x) {
 };
 template <class E>
 concept sensor = requires(C<E> c, double x) { E::sensor(c, x, x); };
+template <class E>
+concept sensor_apart = requires(C<E> c, double x) { E::sensor_apart(c, x, x); };
 template <class E>
 concept sensor_dynamics = requires(C<E> c, S<E> s, double x) { E::sensor_dynamics(c, s, x, x); };
 template <class E>
@@ -197,18 +201,19 @@ constexpr Hooks all_of() {
            if_there(reading<E>, Hooks::reading) | if_there(plant<E>, Hooks::plant) | if_there(begin<E>, Hooks::begin) |
            if_there(substeps<E>, Hooks::substeps) | if_there(possible<E>, Hooks::possible) |
            if_there(tabulate<E>, Hooks::tabulate) | if_there(later<E>, Hooks::later) | if_there(load<E>, Hooks::load) |
-           if_there(torque_of_time<E>, Hooks::torque_of_time) | if_there(inertia<E>, Hooks::inertia);
+           if_there(torque_of_time<E>, Hooks::torque_of_time) | if_there(inertia<E>, Hooks::inertia) |
+           if_there(torque_apart<E>, Hooks::torque_apart) | if_there(sensor_apart<E>, Hooks::sensor_apart);
 }
 
 // Those of which an effect at this place has to have one.
 constexpr Hooks acting_at(Place place) {
     switch (place) {
-        case Place::shaft: return Hooks::torque | Hooks::torque_of_time | dry_hooks | Hooks::load;
+        case Place::shaft: return Hooks::torque | Hooks::torque_apart | Hooks::torque_of_time | dry_hooks | Hooks::load;
         case Place::mechanism: return Hooks::inertia;
         case Place::coupling: return Hooks::coupling | Hooks::hysteresis;
         case Place::actuator: return Hooks::actuator | Hooks::actuator_dynamics;
         case Place::controller: return Hooks::command | Hooks::controller;
-        case Place::sensor: return Hooks::sensor | Hooks::sensor_dynamics | Hooks::reading;
+        case Place::sensor: return Hooks::sensor | Hooks::sensor_apart | Hooks::sensor_dynamics | Hooks::reading;
         case Place::plant: return Hooks::plant;
         case Place::record: break;
     }

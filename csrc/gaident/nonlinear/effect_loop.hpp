@@ -46,7 +46,8 @@ public:
         // A change of the inertia is in the equation that friction is in, at the end where it acts.
         constexpr bool changing = Plant::changing && !Plant::both_ends;
         dry_ = run.effects.meets(effects_with(changing ? dry_hooks | Hooks::inertia : dry_hooks)) || own_.friction();
-        beside_ = run.effects.meets(effects_with(Hooks::torque_of_time)) || own_.shaft();
+        beside_ = run.effects.meets(effects_with(Hooks::torque_of_time | Hooks::torque_apart)) || own_.shaft();
+        bent_ = run.effects.meets(effects_with(Hooks::sensor_apart)) || own_.sensor();
         turning_ = run.effects.meets(effects_that_turn()) || own_.there();
         looking_back_ = run.effects.meets(effects_with(Hooks::tabulate));
         shaping_ = run.effects.meets(effects_with(Hooks::command)) || own_.command();
@@ -210,8 +211,8 @@ private:
     // What the sensor measures, before it is filtered.
     [[gnu::always_inline]] R measured() const {
         R w = plant_.velocity();
-        if (own_.sensor()) [[unlikely]]
-            w = own_.asked(run_, OwnPlace::sensor, w, theta_, held_, time_);
+        if (OwnInLoop<R>::asks && bent_) [[unlikely]]
+            w = measured_apart(run_, c_, w, theta_, held_, time_);
         return Effects::chain(w, [&]<class E>(R x) __attribute__((always_inline)) {
             if constexpr (hook::sensor<E>)
                 if (run_.effects.has<E>()) return E::sensor(c_.effects.template of<E>(), theta_, x);
@@ -347,7 +348,8 @@ private:
     Control pi_;
     double h_, time_ = 0.0;
     bool dry_, turning_, looking_back_, shaping_;
-    bool beside_;  // whether torques of the time or of the user's own effects act at the motor
+    bool beside_;  // whether torques of the time, of several waves or of the user's own effects act at the motor
+    bool bent_;    // whether several waves of the sensor, or the user's own effects, change what it measures
     OwnInLoop<R> own_;
     typename Effects::States<R> states_{};  // all zero
     FrictionLaw<R> law_;

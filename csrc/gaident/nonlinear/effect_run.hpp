@@ -65,8 +65,26 @@ struct PastTorques {
     }
 };
 
+// What brakes at an end of the shaft at the angle theta [N m] of effects that have calls of their own.
+template <Side side, class R>
+[[gnu::always_inline]] inline R torque_apart(const EffectRun& run, const EffectConstants<R>& c, R theta) {
+    R T = R(0.0);
+    each_at<side>([&]<class Key, class E>() __attribute__((always_inline)) {
+        if constexpr (hook::torque_apart<E>)
+            if (run.effects.has<Key>()) T = T + E::torque_apart(c.template of<Key>(), theta);
+    });
+    return T;
+}
+
+// The same, called with values.
+template <Side side, class R>
+[[gnu::noinline]] R torque_braking_apart(const EffectRun& run, const EffectConstants<R>& c, R theta) {
+    return torque_apart<side>(run, c, theta);
+}
+
 // The dry friction at the motor's shaft that follows from the angle, itself or by what the effects there brake with, both in N m.
-template <class R>
+// apart: also of effects that have calls of their own.
+template <bool apart, class R>
 [[gnu::always_inline]] inline R loaded_level(const EffectRun& run, const EffectConstants<R>& c, R theta) {
     R load = R(0.0);
     // One question where a model has none of them.
@@ -76,6 +94,7 @@ template <class R>
                 if (run.effects.has<E>()) return x + E::torque(c.effects.template of<E>(), theta);
             return x;
         });
+    if constexpr (apart) load = load + torque_apart<Side::motor>(run, c, theta);
     return Effects::chain(R(0.0), [&]<class E>(R x) __attribute__((always_inline)) {
         if constexpr (hook::loaded<E>)
             if (run.effects.has<E>()) return x + E::loaded(c.effects.template of<E>(), load);
@@ -89,14 +108,15 @@ template <class R>
 // a sample with backlash; 510 without the call).
 template <class R>
 [[gnu::noinline]] R loaded_level_apart(const EffectRun& run, const EffectConstants<R>& c, R theta) {
-    return loaded_level(run, c, theta);
+    return loaded_level<true>(run, c, theta);
 }
 
-// What brakes at an end of the shaft by the time t alone [N m], and the substep's equation under a change of the inertia.
+// What brakes at an end of the shaft beside the torque hooks [N m]: by the time t, and of effects that have calls of their own.
+// And the substep's equation under a change of the inertia.
 // Called with values, for the same reason.
 template <Side side, class R>
-[[gnu::noinline]] R torque_of_time(const EffectRun& run, const EffectConstants<R>& c, R t) {
-    R T = R(0.0);
+[[gnu::noinline]] R torque_beside(const EffectRun& run, const EffectConstants<R>& c, R theta, R t) {
+    R T = torque_apart<side>(run, c, theta);
     each_at<side>([&]<class Key, class E>() __attribute__((always_inline)) {
         if constexpr (hook::torque_of_time<E>)
             if (run.effects.has<Key>()) T = T + E::torque_of_time(c.template of<Key>(), t);
@@ -172,6 +192,17 @@ private:
     bool command_, torque_, friction_, actuator_, sensor_, shaft_;
     R w_before_, level_ = R(0.0);
 };
+
+// The velocity w as it is measured with a user's own effects and those that have calls of their own; theta: the angle, u: the torque.
+template <class R>
+[[gnu::noinline]] R measured_apart(const EffectRun& run, const EffectConstants<R>& c, R w, R theta, R u, double t) {
+    if (run.own != nullptr && run.own->at(OwnPlace::sensor)) w = OwnInLoop<R>::asked(run, OwnPlace::sensor, w, theta, u, t);
+    return Effects::chain(w, [&]<class E>(R x) __attribute__((always_inline)) {
+        if constexpr (hook::sensor_apart<E>)
+            if (run.effects.has<E>()) return E::sensor_apart(c.effects.template of<E>(), theta, x);
+        return x;
+    });
+}
 
 // Those at the load of two masses, for the loop that has one.
 template <class R>

@@ -27,8 +27,8 @@ template <class R, class Plant, class Control>
     const R w = plant_.velocity();
     if constexpr (OwnInLoop<R>::asks)
         if (beside_) [[unlikely]] {
-            if (run_.effects.meets(effects_with(Hooks::torque_of_time)))
-                T = T - torque_of_time<Side::motor>(run_, c_, R(t > 0.0 ? t : 0.0));
+            if (run_.effects.meets(effects_with(Hooks::torque_of_time | Hooks::torque_apart)))
+                T = T - torque_beside<Side::motor>(run_, c_, theta_, R(t > 0.0 ? t : 0.0));
             if (own_.shaft()) T = own_.with_torque(w, theta_, T, t);
         }
     R w_next;
@@ -77,7 +77,8 @@ template <Side side, class States>
     });
     if constexpr (side == Side::motor)
         if (run_.effects.meets(effects_with(Hooks::loaded | Hooks::level_of_angle))) [[unlikely]]
-            add(width == 1 ? loaded_level_apart(run_, c_, theta_) : loaded_level(run_, c_, theta_));
+            add(width == 1 || run_.effects.meets(effects_with(Hooks::torque_apart)) ? loaded_level_apart(run_, c_, theta_)
+                                                                                    : loaded_level<false>(run_, c_, theta_));
     each_at<side>([&]<class Key, class E>() __attribute__((always_inline)) {
         if constexpr (hook::friction<E>)
             if (run_.effects.has<Key>()) {
@@ -102,7 +103,7 @@ template <class R, class Plant, class Control>
 [[gnu::always_inline]] inline R EffectLoop<R, Plant, Control>::move_both(R T, R w, double t) {
     const R w_load = plant_.load_velocity();
     R T_load = R(0.0);
-    if (load_.turning || run_.effects.meets(load_effects_with(Hooks::torque | Hooks::torque_of_time))) {
+    if (load_.turning || run_.effects.meets(load_effects_with(Hooks::torque | Hooks::torque_of_time | Hooks::torque_apart))) {
         const R at_motor = run_.position.empty() ? fma(w, R(0.5 * h_), angle_) : theta_;
         load_.theta = fnma(w - w_load, R(0.5 * h_), at_motor - (plant_.twist() - load_.twist_at_start));
         each_at<Side::load>([&]<class Key, class E>() __attribute__((always_inline)) {
@@ -110,8 +111,11 @@ template <class R, class Plant, class Control>
                 if (run_.effects.has<Key>()) T_load = T_load - E::torque(c_.template of<Key>(), load_.theta);
         });
         load_.braking = R(0.0) - T_load;
-        if (run_.effects.meets(load_effects_with(Hooks::torque_of_time))) [[unlikely]]
-            T_load = T_load - torque_of_time<Side::load>(run_, c_, R(t > 0.0 ? t : 0.0));
+        if (run_.effects.meets(load_effects_with(Hooks::torque_of_time | Hooks::torque_apart))) [[unlikely]] {
+            if (run_.effects.meets(load_effects_with(Hooks::torque_apart)))
+                load_.braking = load_.braking + torque_braking_apart<Side::load>(run_, c_, load_.theta);
+            T_load = T_load - torque_beside<Side::load>(run_, c_, load_.theta, R(t > 0.0 ? t : 0.0));
+        }
     }
     if (load_.own.there()) [[unlikely]]
         T_load = T_load + load_.own.torque(run_, w_load, load_.theta, T, t);

@@ -21,8 +21,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gaident.estimation.term import Scales, Term
-from gaident.models.effect_rows import effect_and_side
-from gaident.models.effects import place_of, row_of
+from gaident.models.effect_rows import core_key, effect_and_side
+from gaident.models.effects import parameter_count, place_of, row_of
 from gaident.models.factors import FactorCounts
 from gaident.models.model import Model
 from gaident.models.roots import quadratic_roots
@@ -33,9 +33,9 @@ Vector = NDArray[np.float64]
 Matrix = NDArray[np.float64]
 
 
-def parameter_names(effect: str) -> tuple[str, ...]:
-    """Names of an effect's parameters, in the order of the effects table."""
-    return tuple(p.name for p in row_of(effect).parameters)
+def parameter_names(term: Term) -> tuple[str, ...]:
+    """Names of an effect's parameters, in the order of the effects table, one wave's after the other's."""
+    return tuple(p.name for p in row_of(term.name).of_waves(term.waves).parameters)
 
 
 def mechanism(model: Model) -> Vector:
@@ -203,13 +203,13 @@ class Parameterisation:
         return self.term(effect).natural(X[:, self.slot(effect)])
 
     def values(self, X: Matrix, left_out: Sequence[str] = ()) -> tuple[tuple[str, ...], Matrix]:
-        """(effects in the order of the table, rows of base parameters and theirs) for `simulate_values`."""
+        """(effects in the order of the table, by the core's names, rows of base parameters and theirs) for `simulate_values`."""
         shown = [t for t in self._ordered if t.name not in left_out]
         if not shown and not self.on_a_spring:
             return (), self.base_values(X)
         zero = [np.zeros((len(X), 1))] if self.on_a_spring else []
-        parts = [self.base_values(X), *zero, *(t.natural(X[:, self.slot(t.name)]) for t in shown)]
-        return tuple(t.name for t in shown), np.concatenate(parts, axis=1)
+        parts = [self.base_values(X), *zero, *(_of_core(t, t.natural(X[:, self.slot(t.name)])) for t in shown)]
+        return tuple(t.name if t.waves == 1 else core_key(t.name) for t in shown), np.concatenate(parts, axis=1)
 
     def start_values(self, X: Matrix, record: int) -> Matrix | None:
         """Rows of start states of one record, None where it starts at rest."""
@@ -248,12 +248,13 @@ class Parameterisation:
         return Model(float(values[0]), poles, zeros)
 
     def model(self, x: Vector) -> Model:
-        """The model of one x, with its effects."""
+        """The model of one x, with its effects, the waves of each from the strongest on."""
         model = self.linear(x)
         for t in self.terms:
             row = t.natural(x[None, self.slot(t.name)])[0]
+            row = row[t.strongest_first(row)]
             name, side = effect_and_side(t.name)
-            values = dict(zip(parameter_names(t.name), (float(v) for v in row), strict=True))
+            values = dict(zip(parameter_names(t), (float(v) for v in row), strict=True))
             model = model.with_effect(name, side=side, **values)
         return model
 
@@ -280,6 +281,13 @@ class Parameterisation:
             rows += t.steps(self.scales)
         rows += [0.05 * self.scales.speed] * sum(self.starts)
         return _frozen(np.array(rows))
+
+
+def _of_core(term: Term, rows: Matrix) -> Matrix:
+    """Rows of parameters as the core takes them: of several waves all that the effect can have, 0 for those that it has not."""
+    if term.waves == 1:
+        return rows
+    return np.pad(rows, ((0, 0), (0, parameter_count(core_key(term.name)) - rows.shape[1])))
 
 
 def _frozen(values: Matrix) -> Matrix:

@@ -85,6 +85,8 @@ class Term:
     in_time: bool = False  # a sine of the time: phase and size follow from two columns per frequency
     least: float = 0.0  # of its first parameter: what is less is no cause
     components: int = 0  # the first of the two coordinates that these columns belong to
+    waves: int = 1  # how many it has, of as many at most: their coordinates stand one behind the other
+    most_waves: int = 1
     orders: tuple[int, int] = (1, 1)  # lowest and highest order of a harmonic, or the number of frequencies of a sine of the time
     neutral: Callable[[float, Scales], tuple[float, ...]] | None = None  # the nested effect of this level as this one
     from_nothing: bool = False  # its first parameter is its size: at 0 there is no effect
@@ -137,8 +139,9 @@ class Term:
 
         The extended BIC of Chen and Chen (2008, Biometrika 95, 759) with gamma = 1, m the number of models of this size that were
         tried: chance alone makes the best of m candidates better by x with at most m times the probability of one.
+        Of several waves each order was chosen.
         """
-        return 2.0 * float(np.log(self.orders[1] - self.orders[0] + 1))
+        return 2.0 * self.waves * float(np.log(self.orders[1] - self.orders[0] + 1))
 
     @property
     def in_controller(self) -> bool:
@@ -167,8 +170,18 @@ class Term:
 
     @property
     def chooses_order(self) -> bool:
-        """Whether it is a harmonic whose order is one of its numbers, the last of its coordinates."""
+        """Whether it is a harmonic whose order is one of its numbers, the last of its coordinates, or of those of each wave."""
         return bool(self.harmonic) and self.orders[1] > self.orders[0]
+
+    def orders_in(self, z: Vector) -> Vector:
+        """The order of each wave, where it chooses them; z: its coordinates."""
+        return z.reshape(self.waves, -1)[:, -1]
+
+    def strongest_first(self, values: Vector) -> NDArray[np.intp]:
+        """The places of its parameters, the waves from the strongest on; of one wave as they are."""
+        waves = values.reshape(self.waves, -1)
+        order = np.argsort(-waves[:, 0], kind="stable")
+        return np.arange(len(values)).reshape(waves.shape)[order].ravel()
 
     @property
     def in_coupling(self) -> bool:

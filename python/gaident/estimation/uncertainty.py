@@ -32,8 +32,10 @@ from gaident.errors import ModelError
 from gaident.estimation.found_numbers import of_ages, of_numbers, seen_in, variance_of
 from gaident.estimation.least_squares import fit as fitted
 from gaident.estimation.objective import LOST, Fit, Objective
+from gaident.estimation.parameterisation import parameter_names
 from gaident.estimation.projection import inverse_of
 from gaident.estimation.regression.regression import larger_of, long_run
+from gaident.models.effect_rows import by_wave, wave_of
 from gaident.models.effects import row_of
 from gaident.models.factors import model_numbers
 from gaident.models.model import Model
@@ -107,17 +109,18 @@ def _of_the_angle(objective: Objective, fit: Fit) -> Matrix:
     s: standard deviation of white noise on the velocity. The difference of an encoder's angle does not walk away from it.
     """
     part, data = np.zeros((len(fit.x), len(fit.x))), fit.predictor.data
-    turning = [t for t in fit.parameters.terms if t.harmonic and "phase" in [p.name for p in row_of(t.name).parameters]]
+    turning = [t for t in fit.parameters.terms if t.harmonic and "phase" in parameter_names(t)]
     if not turning or data.angle_logged or data.differenced or fit.predictor.own_angle:
         return part
     move = np.zeros(len(fit.x))
     for term in turning:
         slot = fit.parameters.slot(term.name)
-        names = [p.name for p in row_of(term.name).parameters]
-        values = dict(zip(names, term.natural(fit.x[slot][None, :])[0], strict=True))
+        values = dict(zip(parameter_names(term), term.natural(fit.x[slot][None, :])[0], strict=True))
         h = 1e-6  # no decision: the step of a difference
-        turned = term.coordinates(values | {"phase": values["phase"] + h}) - term.coordinates(values)
-        move[slot] = values.get("order", 1.0) * np.asarray(turned) / h
+        later = {name: value + h if wave_of(name)[0] == "phase" else value for name, value in values.items()}
+        turned = term.coordinates(later) - term.coordinates(values)
+        orders = [wave.get("order", 1.0) for wave in by_wave(values)]
+        move[slot] = np.repeat(orders, term.size // term.waves) * np.asarray(turned) / h
     lengths = np.array(objective.lengths, dtype=np.float64)
     noise = data.noise_of(objective.error(fit)) * data.dt
     variance = (
@@ -198,13 +201,14 @@ def estimates_of(objective: Objective, fit: Fit) -> dict[str, dict[str, Estimate
         span = np.maximum(limits[1, slot] - limits[0, slot], 1e-300)
         near = (z <= limits[0, slot] + 1e-6 * span) | (z >= limits[1, slot] - 1e-6 * span)  # no decision: rounding at a bound
         bound = np.any((np.abs(slopes) > 0.0) & near[:, None], axis=0)
-        row = row_of(effect)
+        row = row_of(effect).of_waves(term.waves)
         result[effect] = {}
-        for i, (name, unit) in enumerate((p.name, p.unit) for p in row.parameters):
+        for i, parameter in zip(term.strongest_first(values), row.parameters, strict=True):
+            name, unit = parameter.name, parameter.unit
             std = float("inf") if lost[i] else float(np.sqrt(max(variances[i], 0.0)))
             value = float(values[i])
             # A phase of 0 is as good as any other: it is not compared with itself.
-            size = term.scales.get(name, abs(value))
+            size = term.scales.get(wave_of(name)[0], abs(value))
             known = std < size if size > 0.0 else np.isfinite(std)
             part_of_it = float(np.sqrt(max(parts[i], 0.0)))
             result[effect][name] = Estimate(value, std, unit, bool(bound[i]), bool(known), part_of_it)

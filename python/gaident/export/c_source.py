@@ -28,7 +28,7 @@ from gaident.export.c_text import array, number
 from gaident.export.servo import Servo
 from gaident.files import write_whole
 from gaident.models.discrete import require_strictly_proper
-from gaident.models.effect_rows import effect_and_side
+from gaident.models.effect_rows import effect_and_side, of_one_wave
 from gaident.models.effects import row_of
 from gaident.models.effects_linear import DELAY
 from gaident.models.model import Model
@@ -166,7 +166,7 @@ def _table(
             before.append(f"static const double {name}_share[] = {array(share)};")
             rows.append((field, f"{{{max(back) + 1}, {name}_back, {name}_share}}"))
         else:
-            rows.append((field, array(values)))
+            rows.append((field, array(values) if of_one_wave(effect) == effect else _waves(effect, values)))
     table = [f"static const gaident_drive {name}_drive = {{", *(f"    .{key} = {value}," for key, value in rows), "};"]
     return [*before, *table], length
 
@@ -174,7 +174,14 @@ def _table(
 def _part(effect: str) -> tuple[str, str]:
     """(part of the drive's structure, field there) of an effect's key."""
     name, side = effect_and_side(effect)
-    return (f"at_{side}." if row_of(effect).sides else "", name)
+    return (f"at_{side}." if row_of(of_one_wave(effect)).sides else "", name)
+
+
+def _waves(effect: str, values: Sequence[float]) -> str:
+    """The numbers of an effect with several waves, an array of each."""
+    count = row_of(of_one_wave(effect)).waves
+    size = len(values) // count
+    return "{" + ", ".join(array(values[k * size : k * size + size]) for k in range(count)) + "}"
 
 
 def _runtime(file: str) -> str:

@@ -168,9 +168,14 @@ static double gaident_dry(const gaident_drive *drive, gaident_memory *memory, in
 /* The torque that brakes at the angle theta. */
 static double gaident_braking(const gaident_shaft *k, double theta) {
     double T = 0.0;
+    int i;
     if (k->effects & GAIDENT_LOAD_TORQUE) T += k->load_torque.load;
     if (k->effects & GAIDENT_UNBALANCE) T += k->unbalance.amplitude * sin(theta + k->unbalance.phase);
     if (k->effects & GAIDENT_COGGING) T += k->cogging.amplitude * sin(fma(k->cogging.order, theta, k->cogging.phase));
+    if (k->effects & GAIDENT_COGGING_WAVES)
+        for (i = 0; i < GAIDENT_WAVES; ++i)
+            if (k->cogging_waves[i].amplitude != 0.0)
+                T += k->cogging_waves[i].amplitude * sin(fma(k->cogging_waves[i].order, theta, k->cogging_waves[i].phase));
     return T;
 }
 
@@ -307,6 +312,15 @@ static void gaident_masses(const gaident_drive *k, gaident_memory *s, double T, 
 /* -- the loop ------------------------------------------------------------------------------------------------------------- */
 
 static double gaident_measured(const gaident_drive *k, const gaident_memory *s) {
+    double sum = 1.0;
+    int i;
+    if (k->effects & GAIDENT_VELOCITY_RIPPLE_WAVES) {
+        for (i = 0; i < GAIDENT_WAVES; ++i)
+            if (k->velocity_ripple_waves[i].amplitude != 0.0)
+                sum += k->velocity_ripple_waves[i].amplitude * k->velocity_ripple_waves[i].order *
+                       cos(k->velocity_ripple_waves[i].order * s->angle + k->velocity_ripple_waves[i].phase);
+        return s->x[0] * sum;
+    }
     if (!(k->effects & GAIDENT_VELOCITY_RIPPLE)) return s->x[0];
     return s->x[0] * (1.0 + k->velocity_ripple.amplitude * k->velocity_ripple.order *
                                 cos(k->velocity_ripple.order * s->angle + k->velocity_ripple.phase));

@@ -9,6 +9,8 @@ enum { GAIDENT_ORDER = 14 };       /* of a mechanism, at most */
 enum { GAIDENT_DIFFERENCES = 16 }; /* samples over which the angle is subtracted, at most */
 enum { GAIDENT_FILTERS = 8 };      /* of a controller, one behind the other, at most */
 
+enum { GAIDENT_WAVES = 4 };        /* of an effect of the angle that has several, at most */
+
 enum { GAIDENT_NO_ANTI_WINDUP, GAIDENT_HOLD, GAIDENT_TRACKING };
 
 enum { /* the effects that act */
@@ -41,6 +43,8 @@ enum { /* the effects that act */
     GAIDENT_POSITION_INERTIA = 1 << 26,
     GAIDENT_VELOCITY_DIFFERENCE = 1 << 27,
     GAIDENT_VELOCITY_OBSERVER = 1 << 28,
+    GAIDENT_COGGING_WAVES = 1 << 29, /* several waves, in the place of one */
+    GAIDENT_VELOCITY_RIPPLE_WAVES = 1 << 30,
     GAIDENT_DRY = GAIDENT_COULOMB_FRICTION | GAIDENT_STRIBECK_FRICTION | GAIDENT_ASYMMETRIC_FRICTION |
                   GAIDENT_PRESLIDING_FRICTION | GAIDENT_LUGRE_FRICTION | GAIDENT_QUADRATIC_DRAG |
                   GAIDENT_FRICTION_DRIFT | GAIDENT_LOAD_DEPENDENT_FRICTION | GAIDENT_SQUARE_ROOT_DRAG |
@@ -58,7 +62,7 @@ typedef struct { /* what acts at one end of the shaft */
     struct { double coefficient; } square_root_drag;
     struct { double load; } load_torque;
     struct { double amplitude, phase; } unbalance;
-    struct { double amplitude, order, phase; } cogging;
+    struct { double amplitude, order, phase; } cogging, cogging_waves[GAIDENT_WAVES];
     struct { double torque, rate; } friction_drift;
     struct { double torque, share; } load_dependent_friction;
     struct { double torque, change, order, phase; } position_friction;
@@ -115,7 +119,7 @@ typedef struct {
     struct { double samples, per_samples, step, last; } velocity_difference;
     struct { double of_y, of_v, of_step, of_bend, slope_of_y, slope_of_v, slope_of_step, slope_of_bend, lag; } velocity_observer;
     struct { double decay, of_old, of_new, of_bend, lag; } velocity_filter;
-    struct { double amplitude, order, phase; } velocity_ripple;
+    struct { double amplitude, order, phase; } velocity_ripple, velocity_ripple_waves[GAIDENT_WAVES];
     struct { double step; } velocity_quantisation;
 } gaident_drive;
 

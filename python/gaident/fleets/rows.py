@@ -8,6 +8,7 @@ from typing import Any
 
 from gaident.data.record import Record
 from gaident.diagnosis.library.terms import LIBRARY, level_of
+from gaident.models.effect_rows import by_wave
 from gaident.results.diagnosis import Diagnosis
 from gaident.results.estimate import Estimate, of_axis
 from gaident.results.finding import Finding
@@ -118,15 +119,17 @@ def _levels(findings: Sequence[Finding]) -> dict[str, Estimate]:
 
 
 def _of_finding(finding: Finding, kind: str) -> Iterator[Row]:
-    order = finding.parameters.get("order")
-    for row in _listed("cause" if not finding.is_noise else "record", finding.parameters, kind):
-        yield {
-            **row,
-            "effect": finding.effect,
-            "side": "|".join(finding.sides),
-            "order": None if order is None else round(of_axis("order", order, kind).value),
-            "alternatives": "|".join(finding.alternatives),
-        }
+    # Each wave under its order: which one is the strongest may change from log to log.
+    for parameters in by_wave(finding.parameters):
+        order = parameters.get("order")
+        for row in _listed("cause" if not finding.is_noise else "record", parameters, kind):
+            yield {
+                **row,
+                "effect": finding.effect,
+                "side": "|".join(finding.sides),
+                "order": None if order is None else round(of_axis("order", order, kind).value),
+                "alternatives": "|".join(finding.alternatives),
+            }
 
 
 def _listed(of: str, parameters: Mapping[str, Estimate], kind: str) -> Iterator[Row]:

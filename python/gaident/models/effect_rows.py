@@ -3,29 +3,39 @@
 A shaft effect may act at either side of an elastic shaft.
 What acts at the load has a key of its own, "coulomb_friction@load": the core's name for it, and what fits, searches and exports
 tell effects apart by.
+
+An effect may have several waves of the angle, whose torques or ripples add up: the parameters of the first wave have their plain
+names, those of the second amplitude_2, order_2, phase_2, and so on.
+The core takes several waves as an effect of its own, "cogging_waves", with as many as it can have; those of amplitude 0 are none.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from html import escape
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeVar
 
+import numpy as np
+
+from gaident import _core
 from gaident.axis import Text
-from gaident.checks import one_of, real_number
+from gaident.checks import known_keys, one_of, real_number
 from gaident.errors import ModelError
 from gaident.models.own_effects import Parameter
 
 __all__ = [
-    *("AT_LOAD", "SHAFT", "SIDES", "Row", "Table", "checked_side", "checked_value"),
-    *("effect_and_side", "end_words", "key_of"),
+    *("AT_LOAD", "SHAFT", "SIDES", "Row", "Table", "checked_parameters", "checked_side", "checked_value"),
+    *("by_wave", "core_key", "effect_and_side", "end_words", "key_of", "of_one_wave", "wave_of"),
 ]
+
+Value = TypeVar("Value")
 
 SHAFT = "shaft"
 """The place of effects that add a torque."""
 SIDES = ("motor", "load")
 AT_LOAD = "@load"
+WAVES = "_waves"
 
 
 def effect_and_side(key: str) -> tuple[str, str]:
@@ -37,6 +47,40 @@ def effect_and_side(key: str) -> tuple[str, str]:
 def key_of(name: str, side: str) -> str:
     """The key of an effect at a side."""
     return f"{name}{AT_LOAD}" if side == SIDES[1] else name
+
+
+def core_key(key: str) -> str:
+    """The core's name of an effect of this key with several waves."""
+    name, side = effect_and_side(key)
+    return key_of(f"{name}{WAVES}", side)
+
+
+def of_one_wave(key: str) -> str:
+    """The key of the effect whose several waves the core calls so; another key as it is."""
+    name, side = effect_and_side(key)
+    return key_of(name.removesuffix(WAVES), side)
+
+
+def numbered(name: str, wave: int) -> str:
+    """The name of a parameter of a wave, the first one being 1."""
+    return name if wave == 1 else f"{name}_{wave}"
+
+
+def wave_of(name: str) -> tuple[str, int]:
+    """(plain name, wave) of a parameter's name."""
+    plain, _, number = name.rpartition("_")
+    return (plain, int(number)) if plain and number.isdigit() and int(number) > 1 else (name, 1)
+
+
+def by_wave(parameters: Mapping[str, Value]) -> tuple[dict[str, Value], ...]:
+    """The parameters of each wave of an effect, under their plain names; all of them at once where it has one."""
+    if numbered("order", 2) not in parameters:
+        return (dict(parameters),)
+    waves: dict[int, dict[str, Value]] = {}
+    for name, value in parameters.items():
+        plain, wave = wave_of(name)
+        waves.setdefault(wave, {})[plain] = value
+    return tuple(waves.values())
 
 
 def end_words(sides: Sequence[str]) -> str:
@@ -75,6 +119,8 @@ class Row(NamedTuple):
         The sides at which it may act; () where it has none. See `Model.with_effect`.
     at_load : bool
         Whether it is the row of a shaft effect at the load; False for all rows of the table.
+    waves : int
+        How many waves it may have, each with these parameters; 1 for most effects. See `Model.with_effect`.
 
     See Also
     --------
@@ -92,6 +138,7 @@ class Row(NamedTuple):
     says: Text = Text("")  # the meaning without what the table says after it, for sentences
     turns: bool = False  # depends on the shaft's angle
     at_load: bool = False  # the row of a shaft effect at the load, which is none of the table
+    waves: int = 1  # at most
 
     @property
     def sides(self) -> tuple[str, ...]:
@@ -106,6 +153,12 @@ class Row(NamedTuple):
     def there(self) -> Row:
         """The row of the same effect at the load."""
         return self._replace(at_load=True, needs_two_masses=True)
+
+    def of_waves(self, count: int) -> Row:
+        """The row of the effect with so many waves."""
+        return self._replace(
+            parameters=tuple(p._replace(name=numbered(p.name, k + 1)) for k in range(count) for p in self.parameters)
+        )
 
     def to_dict(self) -> dict[str, Any]:
         """Return the row for JSON."""
@@ -139,6 +192,48 @@ class Table(tuple[Row, ...]):
         head = "".join(f"<th {left}>{title}</th>" for title in ("effect", "place", "parameters", "meaning"))
         body = "".join("<tr>" + "".join(f"<td {left}>{escape(cell)}</td>" for cell in row) + "</tr>" for row in rows)
         return f"<table><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>"
+
+
+def checked_parameters(row: Row, given: object) -> dict[str, float]:
+    """The parameters of an effect in the order of the table, one wave's after the other's; raises ModelError.
+
+    given: name -> value; of an effect that may have several waves also name -> list with an entry for each wave.
+    """
+    row, parameters = _one_by_one(row, given)
+    names = [p.name for p in row.parameters]
+    known = known_keys(parameters, f"effect {row.name}", names, names, ModelError)
+    values = {p.name: checked_value(row, p, known[p.name]) for p in row.parameters}
+    broken = _core.broken_relation(row.name, list(values.values())) if row.relation else ""
+    if broken:
+        shown = ", ".join(f"{k} {v:g}" for k, v in values.items())
+        raise ModelError(f"effect {row.name} has {shown}: {broken}")
+    return values
+
+
+def _one_by_one(row: Row, given: object) -> tuple[Row, object]:
+    """(row of as many waves as are given, parameters with those of each wave under names of their own); raises ModelError."""
+    if row.waves == 1 or not isinstance(given, Mapping):
+        return row, given
+    lists = {name: list(value) for name, value in given.items() if isinstance(value, list | tuple | np.ndarray)}
+    if lists:
+        lengths = {name: len(value) for name, value in lists.items()}
+        what = ", ".join(f"{name} {lengths.get(name, value)}" for name, value in given.items())
+        count = next(iter(lengths.values()))
+        if len(lists) < len(given) or {*lengths.values()} != {count} or not 1 <= count <= row.waves:
+            raise ModelError(
+                f"the waves of {row.name} are given by lists with so many entries: {what}; give each of its parameters as a list "
+                f"with an entry for each wave, from 1 to {row.waves}"
+            )
+        given = {numbered(name, k + 1): value[k] for k in range(count) for name, value in lists.items()}
+    plain = {p.name for p in row.parameters}
+    named = {name: wave_of(name) for name in given if isinstance(name, str)}
+    orders = {n: given[n] for n, (of, _) in named.items() if of == "order" and isinstance(given[n], int | float)}
+    for name, value in orders.items():
+        first = next(n for n, other in orders.items() if other == value)
+        if first != name:
+            raise ModelError(f"{name} of {row.name} is {value:g}, as {first} is: give one wave of each order")
+    count = max((wave for of, wave in named.values() if of in plain), default=1)
+    return row.of_waves(min(count, row.waves)), given
 
 
 def checked_side(row: Row, side: object) -> str:

@@ -17,7 +17,7 @@ from gaident import _core
 from gaident.axis import TURN, Text, say, unit
 from gaident.checks import known_keys, one_of
 from gaident.errors import ModelError
-from gaident.models.effect_rows import SIDES, Row, Table, checked_side, checked_value
+from gaident.models.effect_rows import SIDES, Row, Table, checked_parameters, checked_side, core_key, of_one_wave
 from gaident.models.own_effects import OWN, PLACES, Function, Own, Parameter, Signals, check_kinds, checked
 
 __all__ = ["Effect", "Parameter", "Row", "Signals", "Table", "register", "table", "unregister"]
@@ -26,11 +26,11 @@ __all__ = ["Effect", "Parameter", "Row", "Signals", "Table", "register", "table"
 @lru_cache(maxsize=1)
 def _built_in() -> tuple[Row, ...]:
     rows = []
-    for name, place, meaning, parameters, simulated, two, relation, remark, turns in _core.effect_table():
+    for name, place, meaning, parameters, simulated, two, relation, remark, turns, waves in _core.effect_table():
         says = say(meaning)
         whole = say("{}; {}", says, say(remark)) if remark else says
         own = tuple(Parameter(*p) for p in parameters)
-        rows.append(Row(name, place, own, whole, simulated, two, relation, says=says, turns=turns))
+        rows.append(Row(name, place, own, whole, simulated, two, relation, says=says, turns=turns, waves=waves))
     return tuple(rows)
 
 
@@ -79,8 +79,12 @@ def row_of(key: str) -> Row:
 
 
 def parameter_count(key: str) -> int:
-    """How many parameters an effect has; 0 of what is none."""
-    return len(_by_key()[key][1].parameters) if key in _by_key() else 0
+    """How many parameters an effect has, by the core's name of several waves those of all; 0 of what is none."""
+    one = of_one_wave(key)
+    if one not in _by_key():
+        return 0
+    row = _by_key()[one][1]
+    return len(row.parameters) * (1 if one == key else row.waves)
 
 
 def register(
@@ -253,15 +257,7 @@ class Effect:
                 f"{self.name} describes a record, not a drive, and cannot be simulated: mask such samples, or let "
                 "gaident.diagnose find them"
             )
-        names = [p.name for p in row.parameters]
-        given = known_keys(self.parameters, f"effect {self.name}", names, names, ModelError)
-        values = {p.name: checked_value(row, p, given[p.name]) for p in row.parameters}
-        if row.relation:
-            broken = _core.broken_relation(self.name, list(values.values()))
-            if broken:
-                shown = ", ".join(f"{k} {v:g}" for k, v in values.items())
-                raise ModelError(f"effect {self.name} has {shown}: {broken}")
-        object.__setattr__(self, "parameters", MappingProxyType(values))
+        object.__setattr__(self, "parameters", MappingProxyType(checked_parameters(row, self.parameters)))
         object.__setattr__(self, "side", checked_side(row, self.side))
         object.__setattr__(self, "own", row.own)
 
@@ -271,6 +267,7 @@ class Effect:
         if self.name not in _by_name():
             raise ModelError(_unknown(self.name))
         row = _by_name()[self.name][1]
+        row = row.of_waves(self.waves) if self.waves > 1 else row
         return row.there() if self.at_load else row
 
     @property
@@ -290,8 +287,20 @@ class Effect:
 
     @property
     def values(self) -> tuple[float, ...]:
-        """The parameters in the order of the table, SI units."""
+        """The parameters in the order of the table, one wave's after the other's, SI units."""
         return tuple(self.parameters.values())
+
+    @property
+    def waves(self) -> int:
+        """How many waves of the angle it has; 1 where it can have no more."""
+        return 1 if self.own else len(self.parameters) // len(row_of(self.name).parameters)
+
+    def of_core(self) -> tuple[str, tuple[float, ...]]:
+        """(name, parameters) as the core takes it; the waves that it has not have amplitude 0."""
+        if self.waves == 1:
+            return self.key, self.values
+        name = core_key(self.key)
+        return name, self.values + (0.0,) * (parameter_count(name) - len(self.values))
 
     def to_dict(self) -> dict[str, Any]:
         """Return {"name": ..., "parameters": {...}} for JSON.

@@ -83,10 +83,10 @@ class Model:
         object.__setattr__(self, "effects", checked_effects(effects, self.p, self.q))
 
     @overload
-    def with_effect(self, name: str, **parameters: float) -> Model: ...
+    def with_effect(self, name: str, **parameters: float | Sequence[float]) -> Model: ...
     @overload
-    def with_effect(self, name: str, *, side: str, **parameters: float) -> Model: ...
-    def with_effect(self, name: str, *, side: Any = "motor", **parameters: float) -> Model:
+    def with_effect(self, name: str, *, side: str, **parameters: float | Sequence[float]) -> Model: ...
+    def with_effect(self, name: str, *, side: Any = "motor", **parameters: Any) -> Model:
         """Return the same drive with one more effect, in place of one of the same name and side.
 
         Parameters
@@ -97,8 +97,8 @@ class Model:
             Where a shaft effect acts.
             With two masses it may be the load: the effect then has the load's velocity and angle,
             which starts where the motor's does. An effect may be present at both sides, with parameters of its own at each.
-        **parameters : float
-            All its parameters by name, SI units.
+        **parameters : float or sequence of float
+            All its parameters by name, SI units; of several waves lists, or order_2 and so on for those of the second wave.
 
         Returns
         -------
@@ -394,7 +394,7 @@ class Model:
         made: _core.EffectModel | None = self.__dict__.get("_core_model")
         if made is None:
             poles, zeros = (np.array(roots, dtype=np.complex128) for roots in (self.poles, self.zeros))
-            built_in = [(effect.key, effect.values) for effect in self.effects if not effect.own]
+            built_in = [effect.of_core() for effect in self.effects if not effect.own]
             made = _core.EffectModel(self.gain, poles, zeros, built_in)
             object.__setattr__(self, "_core_model", made)
         return made

@@ -13,7 +13,7 @@ from gaident.checks import size_of_drive
 from gaident.diagnosis.library.cause import Cause
 from gaident.diagnosis.library.terms import LIBRARY
 from gaident.errors import SettingsError
-from gaident.models.effect_rows import SHAFT
+from gaident.models.effect_rows import SHAFT, by_wave
 from gaident.models.effects import Effect
 from gaident.remedies.doubts import doubts_of
 from gaident.remedies.rules import rigid_axis
@@ -92,7 +92,7 @@ def feedforward(
         if row is None or not (row.curve is not None or row.harmonic == "torque"):
             left += [name_in_words(effect.name)] * (effect.row.place == SHAFT)
         elif row.harmonic == "torque":
-            waves.append(_wave(effect, row))
+            waves += _waves(effect, row)
         elif row.curve is not None and row.constant:
             constant -= float(row.curve(np.ones(1), effect.parameters)[0])
         elif row.curve is not None:
@@ -116,11 +116,13 @@ def feedforward(
     )
 
 
-def _wave(effect: Effect, row: Cause) -> Wave:
-    """-A sin(n theta + phase) acts; its opposite is added."""
-    p = effect.parameters
-    order = float(p.get("order", row.orders[0]))
-    return Wave(effect.name, order, float(p["amplitude"] * np.cos(p["phase"])), float(p["amplitude"] * np.sin(p["phase"])))
+def _waves(effect: Effect, row: Cause) -> list[Wave]:
+    """-A sin(n theta + phase) acts, or a sum of such waves; its opposite is added."""
+    found = []
+    for p in by_wave(effect.parameters):
+        order, size, phase = float(p.get("order", row.orders[0])), p["amplitude"], p["phase"]
+        found.append(Wave(effect.name, order, float(size * np.cos(phase)), float(size * np.sin(phase))))
+    return found
 
 
 def _notes(result: Diagnosis, left: list[Text]) -> list[Text]:

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 
 from gaident.axis import unit
 from gaident.errors import GaidentError
+from gaident.models.effect_rows import wave_of
 
 __all__ = ["ANGULAR", "Estimate", "check_complete", "of_axis"]
 
@@ -69,4 +70,4 @@ def of_axis(name: str, estimate: Estimate, axis: str) -> Estimate:
     if axis == "linear" and estimate.unit == "1/turn":
         part = estimate.of_controller / math.tau
         return replace(estimate, value=estimate.value / math.tau, std=estimate.std / math.tau, unit="1/m", of_controller=part)
-    return estimate if name in ANGULAR else replace(estimate, unit=unit(estimate.unit, axis))
+    return estimate if wave_of(name)[0] in ANGULAR else replace(estimate, unit=unit(estimate.unit, axis))

@@ -8,6 +8,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from gaident.axis import unit
+from gaident.models.effect_rows import by_wave
 from gaident.models.effects import row_of
 from gaident.results.estimate import Estimate, of_axis
 
@@ -79,7 +80,7 @@ def _on_linear(x: Any, sentences: Mapping[str, str], name: str, of_model: bool) 
 
 def _effect_on_linear(name: str, parameters: Mapping[str, float | None]) -> dict[str, Any]:
     """The parameters of an effect of a model, each with its unit, which `Effect.from_dict` reads; None: an infinite limit."""
-    units = {p.name: p.unit for p in row_of(name).parameters}
+    units = {p.name: p.unit for p in row_of(name).of_waves(len(by_wave(parameters))).parameters}
     shown = {k: of_axis(k, Estimate(math.inf if v is None else v, 0.0, units[k]), "linear") for k, v in parameters.items()}
     values = {k: e.value if math.isfinite(e.value) else None for k, e in shown.items()}
     return {"parameters": values, "units": {k: e.unit for k, e in shown.items()}}

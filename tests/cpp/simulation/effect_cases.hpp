@@ -30,7 +30,7 @@ inline Factors<double> table_three(double f = 1.0) {
     return factors_from_roots(9803.92, poles, zeros);
 }
 
-using Values = std::array<double, 5>;
+using Values = std::array<double, 12>;
 
 // Typical parameters, and ones so small (or large) that the effect does next to nothing without being taken out.
 struct Sizes {
@@ -51,6 +51,7 @@ inline const Sizes sizes[] = {
     {effect<LoadTorque>, {0.03}, {1e-14}},
     {effect<Unbalance>, {0.05, 0.3}, {1e-14, 0.3}},
     {effect<Cogging>, {0.03, 12.0, 0.4}, {1e-14, 12.0, 0.4}},
+    {effect<CoggingWaves>, {0.03, 12.0, 0.4, 0.02, 4.0, 1.0}, {1e-14, 12.0, 0.4, 1e-14, 4.0, 1.0}},
     {effect<FrictionDrift>, {0.05, -0.2}, {1e-14, -0.2}},
     {effect<LoadDependentFriction>, {0.04, 0.2}, {1e-14, 1e-14}},
     {effect<PositionFriction>, {0.05, 0.6, 3.0, 0.4}, {1e-14, 0.6, 3.0, 0.4}},
@@ -69,6 +70,7 @@ inline const Sizes sizes[] = {
     {effect<VelocityObserver>, {3000.0}, {1e16}},
     {effect<VelocityFilter>, {1e-3}, {1e-16}},
     {effect<VelocityRipple>, {0.005, 2.0, 0.2}, {1e-14, 2.0, 0.2}},
+    {effect<VelocityRippleWaves>, {0.005, 2.0, 0.2, 0.003, 1.0, 1.0}, {1e-14, 2.0, 0.2, 1e-14, 1.0, 1.0}},
     {effect<VelocityQuantisation>, {0.6}, {1e-13}},
     {effect<ExtraResonance>, {900.0, 0.02, 800.0, 0.02}, {900.0, 0.02, 900.0 + 1e-10, 0.02}},
 };

@@ -19,12 +19,15 @@ from scipy.stats import chi2
 import gaident as ga
 from gaident.control.controller import Limiting
 from gaident.diagnosis.library.cause import Cause
-from gaident.diagnosis.selection import mechanisms, model_space, moves, noise_level, rivals, select, side_moves
+from gaident.diagnosis.library.kinds import of_waves
+from gaident.diagnosis.library.terms import LIBRARY as REAL
+from gaident.diagnosis.selection import mechanisms, model_space, moves, noise_level, rivals, select, side_moves, wave_moves
 from gaident.diagnosis.selection.bases import Task
 from gaident.diagnosis.selection.bootstrap import largest_gains
 from gaident.diagnosis.selection.rivals import Replacement, rivals_of
 from gaident.diagnosis.selection.screening import score_test
 from gaident.diagnosis.selection.select import specification
+from gaident.diagnosis.selection.wave_moves import causes
 from gaident.estimation import least_squares as ls
 from gaident.estimation import prediction
 from gaident.estimation.criterion import effective_samples
@@ -1135,3 +1138,145 @@ def test_what_is_followed_up_is_the_same_however_finely_a_record_is_sampled(monk
 def test_no_number_of_the_policy_counts_for_each_sample() -> None:
     """Evidence counts as a whole, or for each independent sample: the same data at 1 kHz and at 100 Hz decide alike."""
     assert not [r.name for r in rows() if "per sample" in r.unit]
+
+
+# Harmonics with several waves.
+
+
+def waves_of(z: Vector, grows: bool) -> Vector:
+    """Sum of a cos(n x) + b sin(n x), whose size grows over the record or does not."""
+    x = 3.3 * np.pi * S
+    parts = [a * np.cos(n * x) + b * np.sin(n * x) for a, b, n in np.asarray(z).reshape(-1, 3)]
+    return np.asarray(sum(parts) * (0.3 + 1.4 * S if grows else 1.0))
+
+
+def harmonic(name: str, kind: str, **more: object) -> Cause:
+    term = toy(name, [(0.1, 0.1, 7.0)], harmonic=kind, orders=(2, 40), most_waves=4, **more)
+    # As of a real one, a search chooses the order and no slope moves it.
+    return replace(term, steps=lambda s: (0.5, 0.5, 0.0), limits=lambda s: [(-10.0, 10.0), (-10.0, 10.0), (2.0, 40.0)])
+
+
+STEADY = harmonic("steady", "torque", other_side="steady far")
+GROWING = harmonic("growing", "velocity")
+STEADY_FAR = harmonic("steady far", "torque", other_side="steady", at_load=True)
+HARMONICS = (A, STEADY, GROWING)
+FIRST, SECOND, THIRD = (0.5, 0.2, 5.0), (-0.3, 0.3, 8.0), (0.2, -0.3, 11.0)
+
+
+@pytest.fixture
+def harmonics(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The toy's library and shapes with these."""
+    with_these = LIBRARY | {t.name: t for t in (STEADY, GROWING, STEADY_FAR)}
+    for module in (wave_moves, moves, model_space, noise_level, side_moves):
+        monkeypatch.setattr(module, "LIBRARY", with_these)
+    monkeypatch.setitem(SHAPES, "steady", lambda z: waves_of(z, False))
+    monkeypatch.setitem(SHAPES, "growing", lambda z: waves_of(z, True))
+    monkeypatch.setitem(SHAPES, "steady far", lambda z: 0.6 * waves_of(z, False) + 0.3 * waves_of(z, True))
+
+
+def with_waves(bench: Bench, *parts: tuple[Cause, tuple[tuple[float, ...], ...]]) -> Fit:
+    """The model with these waves of each harmonic, refitted from them."""
+    hypothesis = bench.hypothesis(*(of_waves(term, len(rows)) for term, rows in parts))
+    x = np.concatenate([np.ones(hypothesis.parameters.base), *(np.array(rows).ravel() for _, rows in parts)])
+    return bench.space.refitted(hypothesis, x)
+
+
+def orders(model: Fit) -> dict[str, list[float]]:
+    parameters = model.parameters
+    return {t.name: sorted(t.orders_in(model.x[parameters.slot(t.name)]).tolist()) for t in parameters.terms}
+
+
+@pytest.mark.usefixtures("harmonics")
+def test_several_waves_are_the_coordinates_and_parameters_of_one_after_the_other() -> None:
+    two = of_waves(STEADY, 2)
+    assert of_waves(STEADY, 1) is STEADY and of_waves(STEADY, 2) is two
+    assert (two.size, two.waves, two.components) == (6, 2, 3)
+    assert two.orders_in(np.array([*FIRST, *SECOND])).tolist() == [5.0, 8.0]
+    assert two.limits(SCALES) == 2 * STEADY.limits(SCALES) and two.steps(SCALES) == 2 * STEADY.steps(SCALES)
+    assert two.search_cost == 2.0 * STEADY.search_cost
+    assert two.strongest_first(np.array([0.1, 1.0, 2.0, 0.3, 4.0, 5.0])).tolist() == [3, 4, 5, 0, 1, 2]
+
+
+@pytest.mark.usefixtures("harmonics")
+def test_each_wave_costs_what_an_effect_does_and_makes_another_model() -> None:
+    bench = Bench(allowed=HARMONICS)
+    one, two = with_waves(bench, (STEADY, (FIRST,))), with_waves(bench, (STEADY, (FIRST, SECOND)))
+    for model, count in ((one, 1), (two, 2)):
+        cost = bench.space.score(model) - model.bic
+        assert cost == pytest.approx(count * (bench.space.penalty + 2.0 * np.log(39.0))) and causes(model) == count
+    assert bench.space.key(one) != bench.space.key(two) and one.effects == two.effects == ("steady",)
+
+
+@pytest.mark.usefixtures("harmonics")
+def test_a_wave_that_is_there_is_worth_it_and_one_that_is_not_goes() -> None:
+    bench = Bench({"steady": (*FIRST, *SECOND)}, allowed=HARMONICS)
+    one, two = with_waves(bench, (STEADY, (FIRST,))), with_waves(bench, (STEADY, (FIRST, SECOND)))
+    three = with_waves(bench, (STEADY, (FIRST, SECOND, THIRD)))
+    assert bench.space.worth(two, one) and not bench.space.worth(three, two)
+    fewer = bench.space.fewer_waves(three)
+    assert [orders(f)["steady"] for f in fewer] == [[8.0, 11.0], [5.0, 11.0], [5.0, 8.0]]
+    assert [bench.space.prefers(f, three) for f in fewer] == [False, False, True]
+    assert not any(bench.space.prefers(f, two) for f in bench.space.drop(two)) and len(bench.space.drop(two)) == 3
+    assert bench.space.fewer_waves(one) == []
+
+
+@pytest.mark.usefixtures("harmonics")
+def test_a_wave_found_as_another_effects_becomes_one_of_its_own() -> None:
+    """The second wave of one effect was taken for one of the other: as one effect of two waves the model is better."""
+    bench = Bench({"steady": (*FIRST, *SECOND)}, allowed=HARMONICS)
+    apart = with_waves(bench, (STEADY, (FIRST,)), (GROWING, (SECOND,)))
+    assert not bench.space.quiet(apart)
+    found = {str(orders(f)): f for f in bench.space.other_wave(apart)}
+    assert set(found) == {"{'steady': [5.0, 8.0]}", "{'growing': [5.0, 8.0]}"}
+    whole = found["{'steady': [5.0, 8.0]}"]
+    assert bench.space.prefers(whole, apart) and not bench.space.prefers(apart, whole) and bench.space.quiet(whole)
+    assert bench.space.other_wave(whole) == [], "where only noise is left nothing is tried"
+
+
+@pytest.mark.usefixtures("harmonics")
+def test_one_of_several_waves_becomes_another_effect() -> None:
+    bench = Bench({"steady": FIRST, "growing": SECOND}, allowed=HARMONICS)
+    together = with_waves(bench, (STEADY, (FIRST, SECOND)))
+    found = {str(orders(f)): f for f in bench.space.other_wave(together)}
+    assert set(found) == {
+        "{'growing': [5.0, 8.0]}",
+        "{'steady': [8.0], 'growing': [5.0]}",
+        "{'steady': [5.0], 'growing': [8.0]}",
+    }
+    right = found["{'steady': [5.0], 'growing': [8.0]}"]
+    assert bench.space.prefers(right, together) and not bench.space.prefers(together, right)
+    wrong = found["{'steady': [8.0], 'growing': [5.0]}"]
+    assert bench.space.score(wrong) > bench.space.score(together) and not bench.space.prefers(wrong, together)
+
+
+@pytest.mark.usefixtures("harmonics")
+def test_an_order_that_an_effect_has_is_no_second_wave_and_four_are_the_most() -> None:
+    bench = Bench({"steady": (*FIRST, *SECOND, *THIRD)}, allowed=HARMONICS, noise=0.5 * NOISE)
+    same = with_waves(bench, (STEADY, (FIRST, SECOND)), (GROWING, (FIRST,)))
+    assert not [f for f in bench.space.one_wave_moved(same, same.parameters.term("growing")) if f.effects == ("steady",)]
+    full = with_waves(bench, (STEADY, (FIRST, SECOND, THIRD, (0.1, 0.1, 20.0))), (GROWING, ((0.1, 0.1, 9.0),)))
+    assert bench.space.one_wave_moved(full, full.parameters.term("growing")) == []
+
+
+@pytest.mark.usefixtures("harmonics")
+def test_all_waves_go_to_the_other_end_of_the_shaft_together() -> None:
+    bench = Bench({"steady far": (*FIRST, *SECOND)}, masses=2, allowed=HARMONICS, plain=True)
+    near = with_waves(bench, (STEADY, (FIRST, SECOND)))
+    far = bench.space.at_other_side(near, near.parameters.term("steady"))
+    assert far is not None and orders(far) == {"steady far": [5.0, 8.0]} and bench.space.prefers(far, near)
+
+
+@pytest.mark.usefixtures("harmonics")
+def test_the_core_is_given_all_waves_that_it_knows() -> None:
+    one = REAL["cogging"]
+    plain = Bench().hypothesis().parameters
+    parameters: Parameterisation = plain.extended(of_waves(one, 2))
+    x = np.concatenate([np.ones(plain.base), [0.03, 0.04, 5.0, 0.06, 0.08, 8.0]])
+    names, values = parameters.values(x[None, :])
+    assert names == ("cogging_waves",) and values.shape == (1, plain.base + 12)
+    assert values[0, plain.base :].tolist() == pytest.approx(
+        [0.05, 5.0, np.arctan2(4.0, 3.0), 0.1, 8.0, np.arctan2(4.0, 3.0), *[0.0] * 6]
+    )
+    (effect,) = parameters.model(x).effects
+    assert (effect.parameters["amplitude"], effect.parameters["order"]) == pytest.approx((0.1, 8.0)), "the strongest first"
+    assert plain.extended(one).values(x[None, : plain.base + 3])[0] == ("cogging",)

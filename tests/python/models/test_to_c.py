@@ -62,6 +62,18 @@ _loaded = ONE
 for _name in ("load_dependent_friction", "load_torque", "unbalance", "cogging"):
     _loaded = _loaded.with_effect(_name, **SIZES[_name])
 CASES["loaded"] = (_loaded, CONTROLLER, {})
+_waves = {"amplitude": [0.03, 0.02, 0.01], "order": [4.0, 12.0, 6.0], "phase": [0.4, -1.0, 2.0]}
+CASES["cogging_of_three_orders"] = (ONE.with_effect("cogging", **_waves), CONTROLLER, {})
+CASES["load_cogging_of_three_orders"] = (
+    TWO.with_effect("cogging", side="load", **_waves).with_effect("cogging", **SIZES["cogging"]),
+    CONTROLLER,
+    {},
+)
+CASES["ripple_of_two_orders"] = (
+    ONE.with_effect("velocity_ripple", amplitude=[5e-3, 3e-3], order=[2.0, 1.0], phase=[0.2, 1.0]),
+    CONTROLLER,
+    {},
+)
 
 COMMAND = np.repeat([20.0, 60.0, -40.0, -5.0, 5.0, 0.0], N // 6)
 TORQUE = 0.3 * np.sin(np.linspace(0.0, 25.0, N)) + 0.15 * (np.arange(N) > 120)

@@ -65,6 +65,8 @@ EFFECTS = (
 NOISE_EFFECTS = ("velocity_quantisation", "outliers")
 LATER = ("hysteretic_coupling", "square_root_drag", "position_friction", "torque_hum", "position_inertia")
 """Effects that are younger than the tables of bench/README.md: what a seed draws there stays the same without them."""
+WAVE_ORDERS = {"cogging": (2, 4, 6, 8, 12, 18, 24), "velocity_ripple": (1, 2, 3, 4, 8)}
+"""Effects that may have several waves -> orders that these are drawn from."""
 FRICTION = (
     *("coulomb_friction", "stribeck_friction", "asymmetric_friction", "presliding_friction", "friction_drift"),
     "lugre_friction",
@@ -338,6 +340,17 @@ def as_ramps_ask(hidden: dict[str, dict[str, float]], plant: Plant, command: Arr
         hidden["torque_saturation"]["limit"] *= asked / (3.7 * max(1.0, plant.kp / 0.0232))
 
 
+def with_waves(name: str, first: dict[str, float], count: int, rng: np.random.Generator) -> dict[str, float]:
+    """An effect with so many waves in all, the further ones smaller and of other orders; others as they are."""
+    if (orders := WAVE_ORDERS.get(name.removesuffix(AT_LOAD))) is None:
+        return first
+    found, left = dict(first), [n for n in orders if n != first["order"]]
+    for k, order in enumerate(rng.choice(left, count - 1, replace=False), 2):
+        found[f"amplitude_{k}"] = first["amplitude"] * float(rng.uniform(0.3, 1.0))
+        found |= {f"order_{k}": float(order), f"phase_{k}": float(rng.uniform(-np.pi, np.pi))}
+    return found
+
+
 def as_the_way_is(hidden: dict[str, dict[str, float]], plant: Plant, command: Array) -> None:
     """Put a stop at that share of the largest angle of the axis without it."""
     if "contact" in hidden:
@@ -388,9 +401,10 @@ def random_case(
     plant: Plant | None = None,
     position_logged: bool = False,
     settle: int = 0,
+    waves: int = 1,
 ) -> tuple[ga.Record, ga.Record | None, ga.PI | ga.Cascade, Truth]:
     """Draw record, validation record (None for a single step), controller and truth; arguments as in `random_truth`."""
-    truth = random_truth(seed, effect, kind, noise, factor, plant, settle)
+    truth = random_truth(seed, effect, kind, noise, factor, plant, settle, waves)
     return *records(truth, torque_logged, position_logged), truth.plant.controller, truth
 
 
@@ -402,10 +416,12 @@ def random_truth(
     factor: float | None = None,
     plant: Plant | None = None,
     settle: int = 0,
+    waves: int = 1,
 ) -> Truth:
     """Draw a drive, what hides in it and the commands; the same arguments give the same case.
 
     `factor` None: log-uniform in 0.5..2, for each effect of a pair its own.
+    `waves`: so many of each effect that may have several, of orders of their own.
     Random numbers depend on seed, effect and kind, not on noise or factor, so that curves over the size follow one drive.
     """
     effects = (effect,) if isinstance(effect, str) else tuple(effect or ())
@@ -421,6 +437,8 @@ def random_truth(
         hidden = {
             name: draw_effect(name, factors[i] if factor is None else factor, now, samples, rng) for i, name in enumerate(effects)
         }
+        if waves > 1:
+            hidden = {name: with_waves(name, values, waves, rng) for name, values in hidden.items()}
         commands = [command_for(kind, now, rng, other_order) for other_order in (False, True)]
         if kind in ANYWHERE:
             as_ramps_ask(hidden, now, commands[0])

@@ -161,6 +161,8 @@ SHAFT = (
     "position_friction",
 )
 OUTSIDE = ("random_walk_friction", "thermal_gain", "resolver_error_of_speed", "contact", "growing_inertia")
+SEVERAL_WAVES = ("cogging", "velocity_ripple")
+"""Effects that may have up to four waves: the second one's parameters are amplitude_2, order_2, phase_2, and so on."""
 COUPLING = ("backlash", "hardening_stiffness", "hysteretic_coupling")
 
 
@@ -227,6 +229,8 @@ def drive_values(plant: Plant, effects: Effects) -> tuple[dict[str, float], dict
 def _add(values: dict[str, float], effect: str, parameters: Mapping[str, float], plant: Plant) -> None:
     """One effect in the fields of a drive."""
     known = FIELDS.get(effect) or FRICTION[effect]
+    waves = (len(parameters) // len(known) if effect in SEVERAL_WAVES else 1) or 1
+    known = known | {f"{name}_{k}": f"{place}_{k}" for k in range(2, waves + 1) for name, place in known.items()}
     if set(parameters) != set(known):
         raise ValueError(f"{effect} takes {sorted(known)}, not {sorted(parameters)}")
     if effect in COUPLING and not plant.two_masses:

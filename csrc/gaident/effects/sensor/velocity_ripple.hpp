@@ -29,7 +29,12 @@ struct VelocityRipple {
 
     template <class R>
     [[gnu::always_inline]] static R sensor(const Coefficients<R>& c, R theta, R w) {
-        return w * fma(c.amplitude * c.order, cosine(fma(c.order, theta, c.phase)), R(1.0));
+        return w * with_wave(c, theta, R(1.0));
+    }
+    // What the velocity is multiplied by, with one wave more.
+    template <class R>
+    [[gnu::always_inline]] static R with_wave(const Coefficients<R>& c, R theta, R sum) {
+        return fma(c.amplitude * c.order, cosine(fma(c.order, theta, c.phase)), sum);
     }
 };
 

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from gaident.axis import Text, called, joined, say
+from gaident.axis import AXES, Text, called, joined, say
 from gaident.control.found import FoundNumbers
 from gaident.diagnosis.explain.ends import NO_ENDS, Ends
 from gaident.diagnosis.library.sides import called_of
@@ -16,10 +16,10 @@ from gaident.diagnosis.selection.offset import Offset
 from gaident.diagnosis.selection.select import Selection
 from gaident.estimation.dataset import DataSet
 from gaident.identification.notes import slower_than_the_loop
-from gaident.models.effect_rows import end_words
+from gaident.models.effect_rows import by_wave, end_words
 from gaident.models.effects import row_of
 from gaident.policy.table import POLICY
-from gaident.results.estimate import Estimate
+from gaident.results.estimate import Estimate, of_axis
 from gaident.results.finding import Finding
 
 __all__ = [
@@ -60,6 +60,8 @@ def evidence_of(
     from gaident.show.wording import certainty
 
     what = row_of(effect).says.begun()
+    if known is not None:
+        what = say("{}{}", what, _orders(known[0]))
     if ends.apart:
         what = say("{}, {}", what, end_words(ends.sides))
     there = f", with it {end_words((ends.other,))} {ends.worse:.0f}" if ends.worse > 0.0 else ""
@@ -71,6 +73,16 @@ def evidence_of(
     if offset is not None and effect == offset.effect:
         return say("{}: {} {}. {}", what, sure, worse, offset.sentence)
     return say("{}: {} {}.{}", what, sure, worse, "" if known is None else _at_speed(effect, *known))
+
+
+def _orders(parameters: Mapping[str, Estimate]) -> Text | str:
+    """The orders of an effect with several waves; empty for others."""
+    orders = [wave["order"] for wave in by_wave(parameters) if "order" in wave]
+    if len(orders) < 2:
+        return ""
+    said_on = {axis: [f"{of_axis('order', order, axis).value:.4g}" for order in orders] for axis in AXES}
+    *first, last = map(Text, said_on["rotary"], said_on["linear"])
+    return say(", here n = {} and {}", joined(", ", first), last)
 
 
 def _at_speed(effect: str, parameters: Mapping[str, Estimate], velocity: NDArray[np.float64]) -> Text | str:

@@ -19,11 +19,12 @@ Vector = NDArray[np.float64]
 
 
 def _behind_ripple(seen: Vector, velocity: Vector, values: Vector) -> Vector:
-    """theta = theta_m - a (sin(n theta + phase) - sin(phase)), two rounds: a is small."""
-    amplitude, order, phase = values
+    """theta = theta_m - sum of a (sin(n theta + phase) - sin(phase)) over the waves, two rounds: a is small."""
     angle = seen
     for _ in range(2):
-        angle = seen - amplitude * (np.sin(order * angle + phase) - np.sin(phase))
+        before, angle = angle, seen
+        for amplitude, order, phase in values.reshape(-1, 3):  # no decision: numbers of a wave
+            angle = angle - amplitude * (np.sin(order * before + phase) - np.sin(phase))
     return angle
 
 

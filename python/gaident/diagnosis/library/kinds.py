@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import replace
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -12,8 +13,10 @@ from numpy.typing import NDArray
 from gaident.diagnosis.library.cause import Cause
 from gaident.diagnosis.library.coordinates import positive
 from gaident.estimation.term import PHASE, Rows, Scales
+from gaident.models.effect_rows import by_wave
+from gaident.models.effects import row_of
 
-__all__ = ["FREE", "harmonic", "linear", "single", "tone"]
+__all__ = ["FREE", "harmonic", "linear", "of_waves", "single", "tone"]
 
 FREE = 1e6  # no decision: what an argument may be: a bound that nothing reaches;
 """Times the largest torque of the log: a pendulum that swings with little friction has far more torque than drives it."""
@@ -124,4 +127,31 @@ def harmonic(effect: str, place: str, first: int, with_order: bool, kind: str, *
 
     turning = {"phase": PHASE}
     row = Cause(effect, place, natural, coordinates, limits, lambda s: [], steps, harmonic=kind, scales=turning, **known)
-    return replace(row, from_nothing=True)
+    return replace(row, from_nothing=True, most_waves=row_of(effect).waves)
+
+
+@cache
+def of_waves(one: Cause, count: int) -> Cause:
+    """A harmonic with so many waves whose torques or ripples add up; one: with one wave, itself where that is the count.
+
+    Their coordinates and parameters stand one behind the other.
+    """
+    if count == one.waves:
+        return one
+    size = one.size
+
+    def natural(z: Matrix) -> Matrix:
+        return np.hstack([one.natural(z[:, k : k + size]) for k in range(0, count * size, size)])
+
+    def coordinates(p: Mapping[str, float]) -> Vector:
+        return np.concatenate([one.coordinates(wave) for wave in by_wave(p)])
+
+    return replace(
+        one,
+        natural=natural,
+        coordinates=coordinates,
+        limits=lambda s: one.limits(s) * count,
+        steps=lambda s: one.steps(s) * count,
+        components=(count - 1) * size,
+        waves=count,
+    )

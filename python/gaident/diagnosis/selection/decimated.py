@@ -84,7 +84,7 @@ def moved(data: DataSet, scales: Scales, fit: Fit) -> Fit:
     new = replace(new, scales=replace(new.scales, friction=old.scales.friction))
     x = new.base_vector(linear)
     for t in old.terms:
-        natural = dict(zip(parameter_names(t.name), old.effect_values(fit.x[None, :], t.name)[0].tolist(), strict=True))
+        natural = dict(zip(parameter_names(t), old.effect_values(fit.x[None, :], t.name)[0].tolist(), strict=True))
         new = new.extended(t)
         low, high = np.array(t.limits(new.scales)).T
         x = np.concatenate([x, np.clip(t.coordinates(natural), low, high)])

@@ -250,7 +250,8 @@ def _drifts(t: Vector, w: Vector, u: Vector | None) -> list[Matrix]:
 def _orders(fit: Fit) -> list[float]:
     """The orders of the angle that the model contains."""
     terms = [t for t in fit.parameters.terms if t.harmonic]
-    return [float(fit.x[fit.parameters.slot(t.name)][-1]) if t.chooses_order else 1.0 for t in terms]
+    found = [t.orders_in(fit.x[fit.parameters.slot(t.name)]) if t.chooses_order else [1.0] for t in terms]
+    return [float(order) for orders in found for order in orders]
 
 
 def _waves(orders: Sequence[float], angle: Vector, w: Vector) -> tuple[Matrix, Matrix]:

@@ -44,13 +44,13 @@ def words(effects: Iterable[str]) -> str:
 
 def representative(term: Term) -> str:
     """Of effects that no record tells apart and that have as many parameters, the first."""
-    alike = (n for n in equivalents(term.name) if LIBRARY[n].size == term.size)
+    alike = (n for n in equivalents(term.name) if LIBRARY[n].size == LIBRARY[term.name].size)
     return min((*alike, term.name))
 
 
 def _depth(term: Term) -> int:
-    """1, and one more for each effect that is nested in the next."""
-    return 1 + max((_depth(LIBRARY[name]) for name in term.nested), default=0)
+    """1 for each wave, and one more for each effect that is nested in the next."""
+    return term.waves + max((_depth(LIBRARY[name]) for name in term.nested), default=0)
 
 
 def _linear_part(fit: Fit) -> tuple[Hypothesis, Vector]:
@@ -134,7 +134,7 @@ class ModelSpace(NoiseLevel):
 
     def key(self, fit: Fit) -> Hashable:
         """The same for the same mechanism with the same effects, or with equivalent ones."""
-        return fit.parameters.kind, frozenset(representative(t) for t in fit.parameters.terms)
+        return fit.parameters.kind, frozenset((representative(t), t.waves) for t in fit.parameters.terms)
 
     def worth(self, fuller: Fit, simpler: Fit) -> bool:
         """The decision: whether a fuller model is worth its effects against a simpler one."""
@@ -246,7 +246,9 @@ class ModelSpace(NoiseLevel):
         The score counts independent samples: those of the space of output errors,
         else those in the errors of the model without the cause.
         """
-        if not set(other.effects) - set(whitened.effects):
+        if {(t.name, k) for t in other.parameters.terms for k in range(t.waves)} <= {
+            (t.name, k) for t in whitened.parameters.terms for k in range(t.waves)
+        }:
             return False
         space = self.of_output_errors()
         predictor = space.free_predictor(other)

@@ -5,6 +5,7 @@ A model is a mechanism (one mass or two) with effects. The moves are
     add         an effect, or a generalisation in the place of a simpler one of its family     (score test, then fits)
     drop        an effect                                                                      (backward elimination)
     simplify    a generalisation to what it contains
+    waves       one wave more or less of a harmonic, or as one of another                      (wave_moves)
     exchange    an effect for one of its equivalence class, where only others tell them apart
     other side  a shaft effect of two masses at the other end of the shaft
     a load      one mass with effects of its shaft as two masses, these at the load
@@ -30,6 +31,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gaident.diagnosis.library.equivalences import equivalents
+from gaident.diagnosis.library.kinds import of_waves
 from gaident.diagnosis.library.terms import LIBRARY
 from gaident.diagnosis.selection.mechanisms import (
     as_one_mass,
@@ -44,6 +46,7 @@ from gaident.diagnosis.selection.model_space import words
 from gaident.diagnosis.selection.repeated import Repeated
 from gaident.diagnosis.selection.screening.score_test import ScoreTest
 from gaident.diagnosis.selection.side_moves import better_sides
+from gaident.diagnosis.selection.wave_moves import WaveMoves, causes
 from gaident.estimation import least_squares as ls
 from gaident.estimation.criterion import gained
 from gaident.estimation.noise_model import WHITE
@@ -68,7 +71,7 @@ def _nested(hypothesis: Hypothesis, x: NDArray[np.float64], term: Term, simple: 
 
 
 @dataclass(frozen=True, eq=False)
-class Moves(Repeated):
+class Moves(Repeated, WaveMoves):
     """The models over one objective, and the moves between them."""
 
     # Moves that add.
@@ -106,7 +109,7 @@ class Moves(Repeated):
 
     def _model(self, fit: Fit) -> Hashable:
         """The same for fits of the same model that grow to the same."""
-        return fit.parameters.kind, frozenset(fit.effects), self.allowed
+        return fit.parameters.kind, frozenset((t.name, t.waves) for t in fit.parameters.terms), self.allowed
 
     def _add(self, now: Fit) -> list[Fit]:
         self.note(f"looking beyond {words(now.effects) or 'the linear model'}")
@@ -124,6 +127,7 @@ class Moves(Repeated):
                 if start is not None:
                     fits.append(self.refitted(start.hypothesis, start.starts[0]))
                     self._generalisations(test, now, fits[-1], first)
+        self.with_more_waves(test, now)
         if not test.trials:
             return []
         rankings = [test.ranked(WHITE), test.ranked(None)] if self.whitens else [test.ranked(WHITE)]
@@ -137,14 +141,17 @@ class Moves(Repeated):
         done = {f.parameters.terms[-1] for f in fits}
         short: dict[Term, Fit] = {}
         for ranking in rankings:
-            for s in better_sides([s for s in ranking if s.term not in done])[: self.policy.screened]:
+            single, more = self.apart(ranking)
+            for s in better_sides([s for s in single if s.term not in done])[: self.policy.screened] + more:
                 # Of a resonance the cost has a local minimum at each frequency: it is fitted from all its starts.
                 for x in s.starts if s.term.resonates else s.starts[: self.policy.starts_each]:
                     fit = ls.scored(self.objective, ls.fit(self.objective, s.hypothesis, x, s.noise, self.policy.glance))
                     if s.term not in short or fit.bic < short[s.term].bic:
                         short[s.term] = fit
         glanced = self._promising(now, test, short.values()) if self.whitens and self.quiet(now) else short.values()
-        best = sorted((f for f in glanced if f.cost < WORST), key=lambda f: f.bic)[: self.policy.finished]
+        ordered = sorted((f for f in glanced if f.cost < WORST), key=lambda f: f.bic)
+        best = [f for f in ordered if f.parameters.terms[-1].waves == 1][: self.policy.finished]
+        best += [f for f in ordered if f.parameters.terms[-1].waves > 1][:1]
         best = sorted((self.completed(f) for f in best), key=self.score)
         reach = self.policy.beam_reach * self.penalty
         fits += [self.under_best_predictor(f) if self.score(f) < self.score(best[0]) + reach else f for f in best]
@@ -280,8 +287,8 @@ class Moves(Repeated):
     # Moves that reduce.
 
     def drop(self, fit: Fit) -> list[Fit]:
-        """Without each of the effects."""
-        return [self.without(fit, e) for e in fit.effects]
+        """Without each of the effects, and without each of the waves of one that has several."""
+        return [*(self.without(fit, e) for e in fit.effects), *self.fewer_waves(fit)]
 
     def without(self, fit: Fit, effect: str) -> Fit:
         """The model refitted without one of its effects; beside stops and impacts after a search of its own.
@@ -344,40 +351,18 @@ class Moves(Repeated):
         found = []
         for t in fit.parameters.terms:
             for other in [LIBRARY[n] for n in equivalents(t.name)]:
-                if other.seen_angle is None or other not in self.allowed or other.size != t.size:
+                if other.seen_angle is None or other not in self.allowed or other.size != LIBRARY[t.name].size:
                     continue
                 short = fit.hypothesis.without(t.name)
                 z, x = fit.x[fit.parameters.slot(t.name)], fit.parameters.removed(fit.x, t.name)
-                found.append(self.refitted(short.extended(other), short.parameters.inserted(x, z)))
-        return found
-
-    def other_wave(self, fit: Fit) -> list[Fit]:
-        """Each harmonic of the angle as another one of the same order, where more than noise is left."""
-        return [] if self.quiet(fit) else [f for t in fit.parameters.terms for f in self.as_other_wave(fit, t)]
-
-    def as_other_wave(self, fit: Fit, term: Term) -> list[Fit]:
-        """The model with another harmonic of the same order in the place of one; empty for what is no harmonic.
-
-        Torque, ripple and inertia of one order are alike at each speed: one of them explains the most of another one.
-        """
-        if not term.chooses_order or term.levels:
-            return []
-        short, x = fit.hypothesis.without(term.name), fit.parameters.removed(fit.x, term.name)
-        blocked = {name for other in short.parameters.terms for name in other.excludes} | set(fit.effects)
-        order = float(fit.x[fit.parameters.slot(term.name)][-1])
-        found = []
-        for other in [o for o in self.allowed if o.chooses_order and not o.levels and o.name not in blocked]:
-            if not other.excludes.isdisjoint(short.effects) or order < other.orders[0]:
-                continue
-            start = np.append(np.zeros(other.size - 1), order)
-            found.append(self.refitted(short.extended(other), short.parameters.inserted(x, start)))
+                found.append(self.refitted(short.extended(of_waves(other, t.waves)), short.parameters.inserted(x, z)))
         return found
 
     def prefers(self, other: Fit, fit: Fit) -> bool:
         """Whether a reduced model takes the place of a model."""
         if self.leaves_the_shaft(other, fit):
             return False
-        if len(other.effects) == len(fit.effects) and other.parameters.kind == fit.parameters.kind:
+        if causes(other) == causes(fit) and other.parameters.kind == fit.parameters.kind:
             nested = any(set(t.nested) & set(other.effects) for t in fit.parameters.terms)
             if not nested:
                 return self.score(other) < self.score(fit)

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from gaident.diagnosis.library.kinds import of_waves
 from gaident.diagnosis.library.terms import LIBRARY
 from gaident.diagnosis.selection.mechanisms import moved_to, resonance, shafts
 from gaident.diagnosis.selection.model_space import ModelSpace
@@ -107,12 +108,12 @@ class SideMoves(ModelSpace):
         return [t for t in found if t is not None]
 
     def _beside(self, hypothesis: Hypothesis, term: Term) -> Term | None:
-        """The same effect at the other end of the shaft, where the rest of a model leaves room for it."""
+        """The same effect, its waves with it, at the other end of the shaft, where the rest of a model leaves room for it."""
         key, there = term.other_side, hypothesis.parameters.terms
         if not key or hypothesis.parameters.masses == 1 or any(t.name == key or t.resonates for t in there):
             return None
-        other = LIBRARY[key]
-        if other.excluded_in(there, self.shown) or not self.may(other):
+        if (other := LIBRARY[key]).excluded_in(there, self.shown) or not self.may(other):
             return None
+        other = of_waves(other, term.waves) if term.waves > 1 else other
         effects = (*hypothesis.effects, key)
         return other if all(t.stands_with(effects) for t in (*there, other)) else None

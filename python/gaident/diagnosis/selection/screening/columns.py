@@ -27,8 +27,13 @@ Matrix = NDArray[np.float64]
 DAMPING = 0.05  # no decision: a start
 
 
-def harmonic_columns(objective: Objective, hypothesis: Hypothesis, x: Vector, term: Term, error: Vector) -> tuple[Vector, Matrix]:
-    """(orders, columns): decrease of the raw error per unit of the two components, a pair of rows per order."""
+def harmonic_columns(
+    objective: Objective, hypothesis: Hypothesis, x: Vector, term: Term, error: Vector, taken: Vector | tuple[float, ...] = ()
+) -> tuple[Vector, Matrix]:
+    """(orders, columns): decrease of the raw error per unit of the two components, a pair of rows per order.
+
+    taken: orders that the effect has already, of which it has no second wave.
+    """
     end = None
     if term.at_load or (term.harmonic == "inertia" and hypothesis.parameters.masses == 2):  # no decision: of two masses
         if not swings_at(hypothesis.parameters, x):
@@ -51,8 +56,9 @@ def harmonic_columns(objective: Objective, hypothesis: Hypothesis, x: Vector, te
         seen |= turned > POLICY.gravity_turn * TURN
     orders = orders[seen & (orders * per_sample < POLICY.seen_band * np.pi)]
     # A change of the inertia beside another wave of its order is what the simulation of that one misses.
-    taken = [t for t in hypothesis.parameters.terms if t.chooses_order and "inertia" in (t.harmonic, term.harmonic)]
-    orders = orders[~np.isin(orders, [float(x[hypothesis.parameters.slot(t.name)][-1]) for t in taken])]
+    beside = [t for t in hypothesis.parameters.terms if t.chooses_order and "inertia" in (t.harmonic, term.harmonic)]
+    gone = [t.orders_in(x[hypothesis.parameters.slot(t.name)]) for t in beside]
+    orders = orders[~np.isin(orders, np.concatenate([taken, *gone]))]
     if len(orders) == 0:
         return orders, np.zeros((0, len(error)))
     waves = _harmonics(per_period * angle, np.rint(orders / per_period))

@@ -127,6 +127,10 @@ class ScoreTest:
         """
         self._add(hypothesis, x, terms, (simple, effect))
 
+    def more_waves(self, fit: Fit, hypothesis: Hypothesis, x: Vector, term: Term) -> None:
+        """A harmonic with one wave more, of another order, in the place of that of a fit; hypothesis, x: without it."""
+        self._add(hypothesis, x, [term], (fit, term.name))
+
     def _base(self, hypothesis: Hypothesis, x: Vector) -> _Base:
         key = hypothesis, x.tobytes()
         if key not in self._bases:
@@ -140,14 +144,20 @@ class ScoreTest:
         for term in terms:
             longer = hypothesis.extended(term)
             if term.harmonic or term.in_time:
-                of_term = harmonic_columns if term.harmonic else tone_columns
-                orders, columns = of_term(self.objective, hypothesis, x, term, base.error)
+                known, taken = np.zeros(0), np.zeros(0)
+                if instead is not None:  # of a simpler friction the level, of fewer waves all of their coordinates
+                    fit, effect = instead
+                    known = fit.x[fit.parameters.slot(effect)][: term.components]
+                    taken = fit.parameters.term(effect).orders_in(known) if term.waves > 1 else taken
+                if term.harmonic:
+                    orders, columns = harmonic_columns(self.objective, hypothesis, x, term, base.error, taken)
+                else:
+                    orders, columns = tone_columns(self.objective, hypothesis, x, term, base.error)
                 if len(orders):
                     rows = np.zeros((len(orders), term.size))
                     if term.size > 2:
                         rows[:, -1] = orders
-                    if instead is not None:
-                        rows[:, 0] = instead[0].x[instead[0].parameters.slot(instead[1])][0]
+                    rows[:, : len(known)] = known
                     self.trials.append(_Trial(term, longer, rows, columns, base, onto, True))
                 continue
             rows = np.array(term.starts(parameters.scales))
@@ -185,7 +195,8 @@ class ScoreTest:
         """Noise filter of the error that no effect of the library explains, to first order: it whitens no effect as noise."""
         directions = [base.J]
         rest = project_out(base.J, base.error[None, :])[0]
-        for t in (t for t in self.trials if t.base is base):
+        # Another wave of an effect that is in the model: other effects of the same order stand for it.
+        for t in (t for t in self.trials if t.base is base and t.term.waves == 1):
             if t.columns:
                 best = np.argsort(_pair_worth(project_out(base.J, t.errors), rest))[::-1][:2]
                 directions += [t.errors[2 * i : 2 * i + 2] for i in best]
