@@ -20,6 +20,7 @@ Every finished case is a line of the file: stop at will, start again and it goes
     jumps    the same loops under a command that jumps between the lines of the log
     sides    two masses, inertia ratio 0.3 to 10, multi-level, torque logged: clean, and every effect of the shaft at either end
     ends     the same drives, dry friction of one kind at both ends at once
+    orders   cogging or encoder ripple of two or three orders at once, the strongest at 0.5..2 times its typical size, multi-level
     measured no controller: a torque that was measured, with white noise of 5 and 10 % of its rms; clean, and effects at the shaft
 """
 
@@ -57,6 +58,7 @@ from drive_cases import (
     KINDS,
     NOISE_EFFECTS,
     PAIRS,
+    WAVE_ORDERS,
     Truth,
     nominal_plants,
     random_case,
@@ -70,7 +72,7 @@ from loop_cases import EVERY, LOOPS, loop_effects, loop_kind, loop_noise, loop_p
 NOISE_KINDS = ("white", "encoder", "coloured")
 GROUPS = (
     *("clean", "effects", "sizes", "pairs", "outside", "encoder", "settled"),
-    *("loops", "ramps", "jumps", "sides", "ends", "measured"),
+    *("loops", "ramps", "jumps", "sides", "ends", "orders", "measured"),
 )
 OTHER_SENSORS = {
     "encoder": {"velocity_quantisation"},
@@ -97,12 +99,14 @@ class Cell:
     loop: str = ""  # of LOOPS; "": a bare PI at the log's clock
     every: int = 1  # controller samples to a line of the log
     torque_noise: float = 0.0  # of the torque's rms: a measured torque drives the axis; 0: the controller's, as logged
+    waves: int = 1  # of each effect that may have several
 
     @property
     def key(self) -> str:
         factor = "" if self.factor is None else f"{self.factor:.4g}"
         loop = [self.loop, str(self.every)] if self.loop else []
         loop += [f"torque {self.torque_noise:g}"] if self.torque_noise else []
+        loop += [f"waves {self.waves}"] if self.waves > 1 else []
         parts = [self.group, *loop, "+".join(self.effects), self.kind, self.noise, f"u{self.torque:d}", factor, str(self.seed)]
         return "/".join(parts)
 
@@ -158,6 +162,10 @@ def cells(group: str, cases: int, seed: int, limits: dict[tuple[str, str], float
             for effect in LEVELS:
                 noise = NOISE_KINDS[(number + zlib.crc32(effect.encode())) % len(NOISE_KINDS)]
                 yield Cell(group, (effect, effect + AT_LOAD), "multi", noise, True, number)
+        elif group == "orders":
+            for effect in WAVE_ORDERS:
+                noise, torque = turn[(number + zlib.crc32(effect.encode())) % len(turn)]
+                yield Cell(group, (effect,), "multi", noise, torque, number, waves=2 + number % 2)
         elif group == "measured":
             for share in TORQUE_NOISE:
                 for effect in ("", *AT_THE_SHAFT):
@@ -191,7 +199,8 @@ def case_of(cell: Cell) -> tuple[ga.Record, ga.Record | None, ga.PI | ga.Cascade
         rng = np.random.default_rng([cell.seed, zlib.crc32("".join(cell.effects[:1]).removesuffix(AT_LOAD).encode())])
         return random_case(cell.seed, cell.effects, cell.kind, cell.noise, cell.torque, cell.factor, two_masses(rng))
     plant = next(p for p in iter(lambda: random_plant(rng), None) if p.name == cell.plant) if cell.plant else None
-    case = random_case(cell.seed, cell.effects, cell.kind, cell.noise, cell.torque, cell.factor, plant, settle=cell.settle)
+    drawn = (cell.seed, cell.effects, cell.kind, cell.noise, cell.torque, cell.factor, plant)
+    case = random_case(*drawn, settle=cell.settle, waves=cell.waves)
     if not cell.torque_noise:
         return case
     record, validation, _, truth = case
@@ -229,7 +238,7 @@ def run(cell: Cell, with_oracle: bool) -> dict[str, Any]:
     if cell.torque_noise:
         line |= inertia_of(dia, truth.plant.J + truth.plant.JL)
     of_library = not set(cell.effects) & set(OUTSIDE) and not describes_noise(cell.effects)
-    inside = cell.effects and cell.group not in ("sides", "ends") and of_library
+    inside = cell.effects and cell.group not in ("sides", "ends", "orders") and of_library
     if with_oracle and validation is not None and inside and not cell.settle and not cell.loop:
         line["oracle"] = blind_refit.oracle(truth, record.velocity, validation.velocity)
     return line

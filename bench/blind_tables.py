@@ -356,6 +356,7 @@ def report(lines: list[Line]) -> str:
     add("Loops of servo drives under jumps between the lines", groups.get("jumps", []), loop_table)
     add("Ends of an elastic shaft", groups.get("sides", []), sides_table)
     add("Dry friction at both ends of an elastic shaft", groups.get("ends", []), ends_table)
+    add("Cogging or ripple of several orders at once", groups.get("orders", []), effect_table)
     add("A measured torque that drives the axis", groups.get("measured", []), measured_table)
     add("Deviations of what was rightly found", [x for x in done if "deviations" in x], coverage_table)
     add("Time of a diagnosis", done, seconds_table)

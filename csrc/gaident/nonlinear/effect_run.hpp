@@ -65,21 +65,15 @@ struct PastTorques {
     }
 };
 
-// What brakes at an end of the shaft at the angle theta [N m] of effects that have calls of their own.
+// What brakes at an end of the shaft at the angle theta [N m] of effects that have calls of their own: called with values.
 template <Side side, class R>
-[[gnu::always_inline]] inline R torque_apart(const EffectRun& run, const EffectConstants<R>& c, R theta) {
+[[gnu::noinline]] R torque_apart(const EffectRun& run, const EffectConstants<R>& c, R theta) {
     R T = R(0.0);
     each_at<side>([&]<class Key, class E>() __attribute__((always_inline)) {
         if constexpr (hook::torque_apart<E>)
             if (run.effects.has<Key>()) T = T + E::torque_apart(c.template of<Key>(), theta);
     });
     return T;
-}
-
-// The same, called with values.
-template <Side side, class R>
-[[gnu::noinline]] R torque_braking_apart(const EffectRun& run, const EffectConstants<R>& c, R theta) {
-    return torque_apart<side>(run, c, theta);
 }
 
 // The dry friction at the motor's shaft that follows from the angle, itself or by what the effects there brake with, both in N m.
@@ -106,17 +100,16 @@ template <bool apart, class R>
 
 // The same called with values: few models have it, and a candidate alone keeps its registers for a coupling (492 instructions
 // a sample with backlash; 510 without the call).
-template <class R>
+template <bool apart, class R>
 [[gnu::noinline]] R loaded_level_apart(const EffectRun& run, const EffectConstants<R>& c, R theta) {
-    return loaded_level<true>(run, c, theta);
+    return loaded_level<apart>(run, c, theta);
 }
 
-// What brakes at an end of the shaft beside the torque hooks [N m]: by the time t, and of effects that have calls of their own.
-// And the substep's equation under a change of the inertia.
+// What brakes at an end of the shaft by the time t alone [N m], and the substep's equation under a change of the inertia.
 // Called with values, for the same reason.
 template <Side side, class R>
-[[gnu::noinline]] R torque_beside(const EffectRun& run, const EffectConstants<R>& c, R theta, R t) {
-    R T = torque_apart<side>(run, c, theta);
+[[gnu::noinline]] R torque_of_time(const EffectRun& run, const EffectConstants<R>& c, R t) {
+    R T = R(0.0);
     each_at<side>([&]<class Key, class E>() __attribute__((always_inline)) {
         if constexpr (hook::torque_of_time<E>)
             if (run.effects.has<Key>()) T = T + E::torque_of_time(c.template of<Key>(), t);

@@ -27,8 +27,10 @@ template <class R, class Plant, class Control>
     const R w = plant_.velocity();
     if constexpr (OwnInLoop<R>::asks)
         if (beside_) [[unlikely]] {
-            if (run_.effects.meets(effects_with(Hooks::torque_of_time | Hooks::torque_apart)))
-                T = T - torque_beside<Side::motor>(run_, c_, theta_, R(t > 0.0 ? t : 0.0));
+            if (run_.effects.meets(effects_with(Hooks::torque_of_time)))
+                T = T - torque_of_time<Side::motor>(run_, c_, R(t > 0.0 ? t : 0.0));
+            if (run_.effects.meets(effects_with(Hooks::torque_apart))) [[unlikely]]
+                T = T - torque_apart<Side::motor>(run_, c_, theta_);
             if (own_.shaft()) T = own_.with_torque(w, theta_, T, t);
         }
     R w_next;
@@ -76,9 +78,11 @@ template <Side side, class States>
             if (run_.effects.has<Key>()) add(E::level_of_angle(c_.template of<Key>(), load_.theta));
     });
     if constexpr (side == Side::motor)
-        if (run_.effects.meets(effects_with(Hooks::loaded | Hooks::level_of_angle))) [[unlikely]]
-            add(width == 1 || run_.effects.meets(effects_with(Hooks::torque_apart)) ? loaded_level_apart(run_, c_, theta_)
-                                                                                    : loaded_level<false>(run_, c_, theta_));
+        if (run_.effects.meets(effects_with(Hooks::loaded | Hooks::level_of_angle))) [[unlikely]] {
+            if constexpr (width == 1) add(loaded_level_apart<false>(run_, c_, theta_));
+            else if (run_.effects.meets(effects_with(Hooks::torque_apart))) add(loaded_level_apart<true>(run_, c_, theta_));
+            else add(loaded_level<false>(run_, c_, theta_));
+        }
     each_at<side>([&]<class Key, class E>() __attribute__((always_inline)) {
         if constexpr (hook::friction<E>)
             if (run_.effects.has<Key>()) {
@@ -110,12 +114,11 @@ template <class R, class Plant, class Control>
             if constexpr (hook::torque<E>)
                 if (run_.effects.has<Key>()) T_load = T_load - E::torque(c_.template of<Key>(), load_.theta);
         });
+        if (run_.effects.meets(load_effects_with(Hooks::torque_apart))) [[unlikely]]
+            T_load = T_load - torque_apart<Side::load>(run_, c_, load_.theta);
         load_.braking = R(0.0) - T_load;
-        if (run_.effects.meets(load_effects_with(Hooks::torque_of_time | Hooks::torque_apart))) [[unlikely]] {
-            if (run_.effects.meets(load_effects_with(Hooks::torque_apart)))
-                load_.braking = load_.braking + torque_braking_apart<Side::load>(run_, c_, load_.theta);
-            T_load = T_load - torque_beside<Side::load>(run_, c_, load_.theta, R(t > 0.0 ? t : 0.0));
-        }
+        if (run_.effects.meets(load_effects_with(Hooks::torque_of_time))) [[unlikely]]
+            T_load = T_load - torque_of_time<Side::load>(run_, c_, R(t > 0.0 ? t : 0.0));
     }
     if (load_.own.there()) [[unlikely]]
         T_load = T_load + load_.own.torque(run_, w_load, load_.theta, T, t);

@@ -24,7 +24,7 @@ class Finding:
     effect : str
         Name of the effect in `gaident.effects.table()`.
     parameters : mapping of str to Estimate
-        Its parameters.
+        Its parameters; of several waves the strongest has the plain names, the next one amplitude_2, order_2, phase_2 and so on.
     alternatives : tuple of str
         Effects that these data cannot tell from it, by statistics or by nature; empty: the cause is named.
     gain : float

@@ -69,6 +69,11 @@ CASES["load_cogging_of_three_orders"] = (
     CONTROLLER,
     {},
 )
+_loaded = ONE.with_effect("cogging", **_waves).with_effect("load_dependent_friction", **SIZES["load_dependent_friction"])
+CASES["loaded_by_cogging_of_three_orders"] = (_loaded, CONTROLLER, {})
+_loaded = TWO.with_effect("cogging", side="load", **_waves)
+_loaded = _loaded.with_effect("load_dependent_friction", side="load", **SIZES["load_dependent_friction"])
+CASES["load_loaded_by_cogging_of_three_orders"] = (_loaded, CONTROLLER, {})
 CASES["ripple_of_two_orders"] = (
     ONE.with_effect("velocity_ripple", amplitude=[5e-3, 3e-3], order=[2.0, 1.0], phase=[0.2, 1.0]),
     CONTROLLER,

@@ -15,6 +15,7 @@ from typing import Any
 import gaident as ga
 from drive_cases import NOISE_EFFECTS
 from drive_rig import AT_LOAD, OUTSIDE, Plant
+from gaident.models.effect_rows import wave_of
 
 # Truth -> what no record of command, velocity and torque can tell from it: always reported together.
 EQUIVALENT = {"torque_lag": "velocity_filter", "velocity_filter": "torque_lag"}
@@ -160,7 +161,7 @@ def deviations(dia: Any, effects: dict[str, dict[str, float]], plant: Plant) -> 
         error = estimate.value - true
         if kind == "amplitude!":
             error = -estimate.value - true
-        if kind.rstrip("!") in ANGLES:
+        if wave_of(kind.rstrip("!"))[0] in ANGLES:
             error = math.remainder(error + math.pi * kind.endswith("!"), 2.0 * math.pi)
         found[name] = error / max(estimate.std, 1e-6 * abs(true))
     return found

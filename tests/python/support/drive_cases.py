@@ -23,6 +23,7 @@ __all__ = [
     "NOISE_EFFECTS",
     "PAIRS",
     "RAMPS",
+    "WAVE_ORDERS",
     "Truth",
     "command_for",
     "draw_effect",
@@ -345,8 +346,9 @@ def with_waves(name: str, first: dict[str, float], count: int, rng: np.random.Ge
     if (orders := WAVE_ORDERS.get(name.removesuffix(AT_LOAD))) is None:
         return first
     found, left = dict(first), [n for n in orders if n != first["order"]]
-    for k, order in enumerate(rng.choice(left, count - 1, replace=False), 2):
-        found[f"amplitude_{k}"] = first["amplitude"] * float(rng.uniform(0.3, 1.0))
+    shares = sorted(rng.uniform(0.3, 1.0, count - 1), reverse=True)
+    for k, (order, share) in enumerate(zip(rng.choice(left, count - 1, replace=False), shares, strict=True), 2):
+        found |= {f"amplitude_{k}": first["amplitude"] * float(share)}
         found |= {f"order_{k}": float(order), f"phase_{k}": float(rng.uniform(-np.pi, np.pi))}
     return found
 
