@@ -12,8 +12,11 @@ import pytest
 
 import gaident as ga
 from drive_rig import Plant, run_drive, skip_without_library
+from gaident.diagnosis.explain.wording import evidence_of
 from gaident.errors import ModelError
+from gaident.fleets.rows import rows_of
 from gaident.models.effect_rows import by_wave
+from gaident.results.json_text import on_axis
 
 ONE = Plant(J=3e-4, D=2e-3, kp=0.03, ki=1.9, dt=1e-3)
 TWO = Plant(J=2e-4, D=1e-3, JL=3e-4, DL=2e-3, KG=20.0, DG=1e-3, kp=0.03, ki=1.5, dt=0.5e-3)
@@ -33,6 +36,11 @@ def first(count: int, lists: dict[str, list[float]]) -> dict[str, list[float]]:
 def singly(lists: dict[str, list[float]]) -> dict[str, float]:
     """The same under a name for each number."""
     return {name if k == 0 else f"{name}_{k + 1}": v for name, values in lists.items() for k, v in enumerate(values)}
+
+
+def estimated(effect: ga.Effect) -> dict[str, ga.Estimate]:
+    """Its parameters as a diagnosis has them."""
+    return {p.name: ga.Estimate(effect.parameters[p.name], 0.01, p.unit) for p in effect.row.parameters}
 
 
 def velocity(plant: Plant, model: ga.Model) -> np.ndarray:
@@ -166,3 +174,38 @@ def diagnosed_axis() -> ga.Diagnosis:
     noise = 0.05 * np.random.default_rng(1).standard_normal(len(COMMAND))
     run = ga.run(linear, ga.Record(plant.dt, command=COMMAND - noise, velocity=noise), plant.controller)
     return ga.diagnose(ga.Record(plant.dt, velocity=run.velocity + noise, torque=run.torque, command=COMMAND), plant.controller)
+
+
+def test_on_a_linear_axis_each_order_counts_periods_to_a_metre_and_each_phase_stays_an_angle() -> None:
+    effect = ga.Effect("cogging", singly(first(2, COGGING)))
+    shown = on_axis({"effects": [effect.to_dict()]}, "linear")["effects"][0]
+    assert shown["units"] == {
+        **{"amplitude": "N", "order": "1/m", "phase": "rad"},
+        **{"amplitude_2": "N", "order_2": "1/m", "phase_2": "rad"},
+    }
+    assert shown["parameters"]["order_2"] == pytest.approx(12.0 / (2.0 * np.pi)) and shown["parameters"]["phase_2"] == 1.0
+    back = ga.Effect.from_dict(shown)
+    assert back.parameters == pytest.approx(dict(effect.parameters))
+    estimates = {
+        name: ga.Estimate(v, 0.01, u.unit) for (name, v), u in zip(effect.parameters.items(), effect.row.parameters, strict=True)
+    }
+    said = evidence_of("cogging", 100.0, (), known=(estimates, np.array([30.0])))
+    assert "n times per turn" in said and ", here n = 4 and 12: " in said
+    assert "n times per metre" in said.linear and ", here n = 0.6366 and 1.91: " in said.linear
+    one = {name: estimates[name] for name in ("amplitude", "order", "phase")}
+    assert "here n" not in evidence_of("cogging", 100.0, (), known=(one, np.array([30.0])))
+
+
+def test_a_fleet_has_a_course_of_each_order(diagnosed_axis: ga.Diagnosis) -> None:
+    """Under the order of each wave, whichever is the strongest."""
+    effect = ga.Effect("cogging", singly(first(2, COGGING)))
+    estimates = {
+        name: ga.Estimate(v, 0.01, u.unit) for (name, v), u in zip(effect.parameters.items(), effect.row.parameters, strict=True)
+    }
+    result = replace(diagnosed_axis, findings=(ga.Finding("cogging", estimates, place="shaft"),))
+    _, rows = rows_of(result, result.records, "rotary", None)
+    found = {(row["order"], row["parameter"]): row["value"] for row in rows if row["effect"] == "cogging"}
+    assert found == {
+        **{(4, "amplitude"): 0.03, (4, "order"): 4.0, (4, "phase"): 0.3},
+        **{(12, "amplitude"): 0.02, (12, "order"): 12.0, (12, "phase"): 1.0},
+    }

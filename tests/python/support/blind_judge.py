@@ -99,7 +99,7 @@ def parameter_errors(findings: list[Any], effects: dict[str, dict[str, float]]) 
     errors = {}
     for finding in findings:
         for name, true in effects.get(finding.effect, {}).items():
-            if name in ANGLES or not true or name not in finding.parameters:
+            if wave_of(name)[0] in ANGLES or not true or name not in finding.parameters:
                 continue
             value = float(finding.parameters[name].value)
             errors[f"{finding.effect}.{name}"] = abs((abs(value) if name == "amplitude" else value) - true) / abs(true)
