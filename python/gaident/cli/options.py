@@ -256,8 +256,9 @@ def parser_of(commands: Mapping[str, str]) -> argparse.ArgumentParser:
     add_retune_options(sub)
 
     line = "saved diagnosis -> tables of friction, gravity, inertia"
-    sub = command("feedforward", "RESULT.json ", line, FEEDFORWARD_HELP, FEEDFORWARD_EXAMPLES)
+    sub = command("feedforward", "RESULT.json [LOG] ", line, FEEDFORWARD_HELP, FEEDFORWARD_EXAMPLES)
     add_feedforward_options(sub)
+    add_log_options(sub)
 
     sub = command("map", "LOG... ", "log -> friction at held speeds, and its law", MAP_HELP, MAP_EXAMPLES)
     add_map_options(sub)

@@ -35,11 +35,14 @@ examples:
 FEEDFORWARD_HELP = """\
 Writes what a drive can add to the torque beforehand, from a saved diagnosis: friction by velocity in both
 directions, gravity and cogging by angle, and the inertia, as CSV or as one C99 file.
+With the log of the diagnosis, or another one of the same loop, it simulates the following error without and
+with the tables.
 """
 FEEDFORWARD_EXAMPLES = """\
 examples:
   gaident feedforward run.json --speed 80                    prints a summary
   gaident feedforward run.json --speed 80 --csv axis.csv --c axis.c
+  gaident feedforward run.json run1.csv --drive drive.toml --speed 80        and what the tables bring
 """
 MAP_HELP = """\
 Maps the friction of an axis: torque against velocity at the speeds that its logs hold, both directions, with
@@ -80,12 +83,12 @@ def add_retune_options(parser: argparse.ArgumentParser) -> None:
 def add_feedforward_options(parser: argparse.ArgumentParser) -> None:
     """What `gaident feedforward` takes."""
     parser.add_argument("result", metavar="RESULT.json", help="what diagnose --out saved")
+    parser.add_argument("log", nargs="?", metavar="LOG", help="log whose command is simulated without and with the tables")
     parser.add_argument("--speed", type=number, required=True, metavar="X", help="highest speed of the table [rad/s]")
     parser.add_argument("--points", type=int, metavar="N", help="speeds of each direction (default 32)")
     parser.add_argument("--angles", type=int, metavar="N", help="angles of a turn (default 360)")
     parser.add_argument("--csv", metavar="FILE", help="write all tables as CSV")
     parser.add_argument("--c", metavar="FILE", help="write one C99 file with a function of the motion")
-    parser.add_argument("--axis", choices=AXES, help="words and units of what is printed (default: those of the result)")
     parser.add_argument("--json", action="store_true", help="print the tables as JSON instead of the summary")
 
 

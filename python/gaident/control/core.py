@@ -87,13 +87,18 @@ def effect_record(
     start_angle: float,
     controller: Controller | None,
     torque_before: float = 0.0,
+    added: Vector | None = None,
 ) -> _core.EffectRecord:
     """A record and its loop, for models with effects and for every controller.
 
     source: command [rad/s], in the open loop torque [N m], with a position controller position command [rad]; of
     `Controller.source_of`. torque_before: of the open loop, before the record [N m].
+    added: to the torque of a Cascade, within its limit, at each of its samples [N m].
     """
     ticks = of_lines(source, position) if controller is None else controller.ticks(dt, source, position)
+    fed = ticks.torque_feedforward
+    if added is not None:
+        fed = fed + added if len(fed) else np.ascontiguousarray(added, dtype=np.float64)
     return _core.EffectRecord(
         clock=_core.Clock(period=dt / ticks.log_every, log_every=ticks.log_every),
         input=ticks.source,
@@ -102,7 +107,7 @@ def effect_record(
         start_angle=start_angle,
         loop=loop(controller, dt),
         velocity_feedforward=ticks.velocity_feedforward,
-        torque_feedforward=ticks.torque_feedforward,
+        torque_feedforward=fed,
         torque_before=torque_before,
     )
 

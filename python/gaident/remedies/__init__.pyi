@@ -1,5 +1,6 @@
 from .compare import ComparedModel, ModelComparison, compare
 from .feedforward import feedforward
+from .following.errors import FollowingError, LoopError
 from .friction_map import FrictionMap, friction_map
 from .retune import retune
 from .tables import FeedforwardTables, Wave
@@ -7,7 +8,9 @@ from .tables import FeedforwardTables, Wave
 __all__ = [
     "ComparedModel",
     "FeedforwardTables",
+    "FollowingError",
     "FrictionMap",
+    "LoopError",
     "ModelComparison",
     "Wave",
     "compare",

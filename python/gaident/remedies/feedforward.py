@@ -3,19 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from gaident.arguments import arg
-from gaident.axis import TURN, Text, joined, say
+from gaident.axis import TURN, Text, joined, message_of, say
 from gaident.axis import called as name_in_words
 from gaident.checks import size_of_drive
+from gaident.data.record import Record
 from gaident.diagnosis.library.cause import Cause
 from gaident.diagnosis.library.terms import LIBRARY
-from gaident.errors import SettingsError
+from gaident.errors import GaidentError, SettingsError
 from gaident.models.effect_rows import SHAFT, by_wave
 from gaident.models.effects import Effect
 from gaident.remedies.doubts import doubts_of
+from gaident.remedies.following.simulated import following_error
 from gaident.remedies.rules import rigid_axis
 from gaident.remedies.tables import FeedforwardTables, Wave
 from gaident.results.diagnosis import Diagnosis
@@ -29,13 +32,19 @@ FEWEST, MOST = 2, 10_000  # no decision: what an argument may be
 
 
 def feedforward(
-    result: Diagnosis, *, speed: float | None = None, points: int = POINTS, angles: int = ANGLES
+    result: Diagnosis,
+    *,
+    speed: float | None = None,
+    points: int = POINTS,
+    angles: int = ANGLES,
+    rec: Record | None = None,
 ) -> FeedforwardTables:
     """Return what a drive can add to the torque beforehand: friction by velocity, gravity and cogging by angle, inertia.
 
     The friction is the static curve of each effect that has one, for both directions; what depends on the past or on time has
     that of its steady motion at the record's start.
     Harmonics of the angle are given as a table and as coefficients of sine and cosine; angles count as in the record.
+    Under a digital controller that the loop follows, a record's command is simulated without and with the tables.
 
     Parameters
     ----------
@@ -47,6 +56,8 @@ def feedforward(
         Speeds of each direction, from 2 to 10000; they lie closer at low speeds.
     angles : int
         Angles of a turn, of a linear axis of the longest period, from 2 to 10000.
+    rec : Record, optional
+        The record whose command is simulated; None: the longest of those of the result, which a loaded result does not have.
 
     Returns
     -------
@@ -56,7 +67,7 @@ def feedforward(
     Raises
     ------
     SettingsError
-        For something else than a diagnosis, numbers out of their range, and no speed where the result has no records.
+        For something else than a diagnosis or a record, numbers out of their range, and no speed where there is no record.
 
     Examples
     --------
@@ -71,6 +82,8 @@ def feedforward(
     >>> tables = ga.feedforward(ga.diagnose(rec, controller, seed=1))
     >>> tables.torque([10.0, -10.0]).round(1).tolist(), round(tables.inertia, 3)
     ([0.8, -0.8], 0.01)
+    >>> tables.following.after.rms < 0.2 * tables.following.before.rms
+    True
     """
     if not isinstance(result, Diagnosis):
         raise SettingsError(f"result is {type(result).__name__}: give what gaident.diagnose found")
@@ -83,7 +96,9 @@ def feedforward(
     for name, count in (("points", points), ("angles", angles)):
         if isinstance(count, bool) or not isinstance(count, int) or not FEWEST <= count <= MOST:
             raise SettingsError(f"{name} is {count!r}: give a whole number from {FEWEST} to {MOST}")
-    highest = _speed_of(result, speed)
+    if rec is not None and not isinstance(rec, Record):
+        raise SettingsError(f"rec is {type(rec).__name__}: give the gaident.Record whose command is to be simulated, or None")
+    highest = _speed_of(result.records if rec is None else (*result.records, rec), speed)
     one_way = np.geomspace(LOWEST * highest, highest, points)
     velocity = np.concatenate([-one_way[::-1], one_way])
     friction, constant, waves, left = np.zeros(2 * points), 0.0, [], []
@@ -101,7 +116,7 @@ def feedforward(
     turn = TURN if result.axis == "rotary" or not waves else TURN / min(wave.order for wave in waves)
     angle = turn * np.arange(angles) / angles if waves else np.zeros(0)
     by_angle = sum((w.sine * np.sin(w.order * angle) + w.cosine * np.cos(w.order * angle) for w in waves), np.zeros(len(angle)))
-    return FeedforwardTables(
+    tables = FeedforwardTables(
         velocity=velocity,
         friction=friction,
         viscous=viscous,
@@ -114,6 +129,10 @@ def feedforward(
         notes=tuple(_notes(result, left)),
         axis=result.axis,
     )
+    try:
+        return replace(tables, following=following_error(result, tables, rec))
+    except GaidentError as reason:
+        return replace(tables, no_following=message_of(reason))
 
 
 def _waves(effect: Effect, row: Cause) -> list[Wave]:
@@ -150,9 +169,9 @@ def _or(names: Sequence[str]) -> Text:
     return joined(" or ", [name_in_words(name) for name in names])
 
 
-def _speed_of(result: Diagnosis, speed: float | None) -> float:
+def _speed_of(records: Sequence[Record], speed: float | None) -> float:
     if speed is not None:
         return size_of_drive(speed, "speed", SettingsError, "give the highest speed of the table, > 0")
-    if not result.records:
+    if not records:
         raise SettingsError(f"the highest speed is not known: a loaded result has no records; give {arg('speed')}")
-    return max(float(np.max(np.abs(r.velocity))) for r in result.records) or 1.0
+    return max(float(np.max(np.abs(r.velocity))) for r in records) or 1.0

@@ -22,6 +22,7 @@ from gaident.errors import SettingsError
 from gaident.export.c_source import c_name
 from gaident.files import write_whole
 from gaident.remedies.c_tables import c_tables
+from gaident.remedies.following.errors import FollowingError
 from gaident.show.wording import WIDTH, number, table
 
 __all__ = ["FeedforwardTables", "Wave"]
@@ -102,6 +103,10 @@ class FeedforwardTables:
         What the tables do not contain, in plain sentences.
     axis : {"rotary", "linear"}
         Kind of the axis.
+    following : FollowingError or None
+        The following error in the simulated loop, without and with the tables; None where no loop can be simulated.
+    no_following : str
+        Why it is None.
 
     See Also
     --------
@@ -119,6 +124,8 @@ class FeedforwardTables:
     doubts: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
     axis: str = field(default="rotary")
+    following: FollowingError | None = None
+    no_following: str = ""
 
     def torque(self, velocity: ArrayLike, angle: ArrayLike = 0.0, acceleration: ArrayLike = 0.0) -> Vector:
         """Return the torque to add for a motion.
@@ -200,6 +207,7 @@ class FeedforwardTables:
 
     def to_dict(self) -> dict[str, Any]:
         """Return plain data for JSON."""
+        how = () if self.following is None else self.following.notes
         lists: Mapping[str, Vector] = {n: getattr(self, n) for n in ("velocity", "friction", "angle", "by_angle")}
         return {
             "schema": "gaident/feedforward",
@@ -209,7 +217,9 @@ class FeedforwardTables:
             "waves": [asdict(wave) for wave in self.waves],
             "doubts": list(self.doubts),
             "notes": list(self.notes),
-            "linear_axis": linear_sentences([*self.doubts, *self.notes]),
+            "following": None if self.following is None else self.following.to_dict(),
+            "no_following": str(self.no_following),
+            "linear_axis": linear_sentences([*self.doubts, *self.notes, *how, self.no_following]),
         }
 
     def summary(self, axis: str | None = None) -> str:
@@ -234,5 +244,13 @@ class FeedforwardTables:
             table(rows) if np.any(self.friction) else [],
             table(waves) if self.waves else [],
             [line for note in self.notes for line in textwrap.wrap(said(note, shown), WIDTH)],
+            self._brought(shown),
         ]
         return "\n\n".join("\n".join(lines) for lines in parts if lines)
+
+    def _brought(self, axis: str) -> list[str]:
+        """What the tables bring in the loop, or why that is not there."""
+        if self.following is not None:
+            return self.following.lines(axis)
+        why = f"What the tables bring is not simulated: {said(self.no_following, axis)}."
+        return textwrap.wrap(why, WIDTH) if self.no_following else []

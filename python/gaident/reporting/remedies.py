@@ -23,6 +23,7 @@ from gaident.models.model import Model
 from gaident.policy.table import POLICY
 from gaident.remedies.doubts import doubts_of
 from gaident.remedies.feedforward import feedforward
+from gaident.remedies.following.simulated import NO_COMMAND, NO_CONTROLLER, NOT_THE_LOOP, RUNS_AWAY
 from gaident.remedies.nonlinear import mendable
 from gaident.remedies.pictures import loop_curves
 from gaident.remedies.retune import retune
@@ -33,11 +34,7 @@ from gaident.show.report.views import Mended, Remedies
 __all__ = ["remedies_of"]
 
 NO_LOOP = say("no controller is simulated in this result, so that there is no loop")
-NO_CONTROLLER = say("no controller is simulated in this result: its torque drives the model")
 NOT_ON_THIS = say("what is said above stands against this model")
-NO_COMMAND = say("the record has no command that the loop follows")
-RUNS_AWAY = say("the simulated loop runs away on this record")
-NOT_THE_LOOP = say("the logged {torque} does not follow from the controller, so that the simulated loop is not the drive's")
 NOTHING = say("the model has no effect that a repair could take out")
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 
+from gaident.cli.drive import drive_of
 from gaident.cli.options import PICTURES
 from gaident.cli.output import apart, naming, print_json, save_figure, target_of
 from gaident.errors import SettingsError
@@ -52,14 +53,16 @@ def retune_command(args: argparse.Namespace) -> None:
 
 
 def feedforward_command(args: argparse.Namespace) -> None:
-    """`gaident feedforward RESULT.json`."""
+    """`gaident feedforward RESULT.json [LOG]`."""
     result = load(args.result)
     if not isinstance(result, Diagnosis):
         raise SettingsError(f"{args.result} contains no diagnosis: give what gaident diagnose wrote with --out")
-    table, source = target_of(args.csv, [args.result]), target_of(args.c, [args.result])
+    given = [args.result, *([args.log] if args.log else [])]
+    table, source = target_of(args.csv, given), target_of(args.c, given)
     apart({"--csv": table, "--c": source})
     sizes = {name: getattr(args, name) for name in ("points", "angles") if getattr(args, name) is not None}
-    tables = feedforward(result, speed=args.speed, **sizes)
+    rec = max(drive_of(args).records(args.log), key=len) if args.log else None
+    tables = feedforward(result, speed=args.speed, **sizes, rec=None if rec is None else result.as_used(rec))
     if table is not None:
         with naming(table):
             tables.to_csv(table)

@@ -7,13 +7,13 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from gaident.axis import called, said, unit, velocity_unit, word
+from gaident.axis import called, percent, said, unit, velocity_unit, word
 from gaident.results.retuning import Retuning
-from gaident.show.chart import Chart, Panel, Trace
+from gaident.show.chart import Chart, Panel, Trace, series
 from gaident.show.html import Html, Row, filled_table, joined, number, table, tag, typeset
 from gaident.show.report.parts import Charts, Section, box, needs_record, sentences
 from gaident.show.report.retuning_words import added_filters, asked_words, figure_rows, gain_rows
-from gaident.show.report.views import Beforehand, LoopCurves, Mended, Remedies, View
+from gaident.show.report.views import Beforehand, Followed, LoopCurves, Mended, Remedies, View
 from gaident.show.response_plots import phase_line
 from gaident.show.units import Scales, beside
 
@@ -35,7 +35,7 @@ def remedies_section(view: View, drawn: Charts) -> Section:
         "What to do",
         _doubts(do.doubts, axis),
         _gains(do, view, drawn),
-        _feedforward(do, view),
+        _feedforward(do, view, drawn),
         _mended(do, view),
     )
 
@@ -119,7 +119,7 @@ def _step_chart(loops: tuple[LoopCurves, ...], axis: str) -> Chart | None:
     return Chart("loop-step", "time after the step [s]", (panel,), text, limits=(0.0, end), height=300, shared=True)
 
 
-def _feedforward(do: Remedies, view: View) -> Html:
+def _feedforward(do: Remedies, view: View, drawn: Charts) -> Html:
     axis = view.axis
     head, found = tag("h3", "Feedforward"), do.tables
     if found is None:
@@ -136,7 +136,7 @@ def _feedforward(do: Remedies, view: View) -> Html:
     text = f"What the drive can add to the {torque} before an error arises, positive for a motion forwards."
     command = f"gaident feedforward RESULT.json --speed {found.velocity[-1]:.4g} --csv axis.csv --c axis.c"
     parts = [head, tag("p", text), filled_table(("", "value", "unit", ""), rows), _friction(found, view), _waves(found, axis)]
-    parts += [sentences(found.notes, axis)]
+    parts += [sentences(found.notes, axis), _brought(found, view, drawn)]
     parts.append(tag("p", tag("small", "All of the tables as files: "), tag("code", command, class_="command")))
     return joined(parts)
 
@@ -169,6 +169,31 @@ def _waves(found: Beforehand, axis: str) -> Html:
         for w in found.waves
     ]
     return table(("", f"periods {word('per turn', axis)}", f"sine [{force}]", f"cosine [{force}]"), [rows])
+
+
+def _brought(found: Beforehand, view: View, drawn: Charts) -> Html:
+    """The following error without and with the tables, or why it is not there."""
+    axis, followed = view.axis, found.following
+    if followed is None:
+        return _reason("What the tables bring is not simulated", found.no_following, axis)
+    si, torque = unit(followed.unit, axis), unit("N m", axis)
+    (_, now), *_ = followed.loops
+    rows: list[Row] = []
+    for name, loop in followed.loops:
+        less = "" if loop is now or not now.rms > 0.0 else typeset(percent(1.0 - loop.rms / now.rms).removesuffix(" %"))
+        own = typeset(beside(view.scales, "", loop.rms, None, si))
+        rows.append((name, number(loop.rms), own, less, number(loop.largest), number(loop.torque)))
+    most = f"largest {word('torque', axis)} [{torque}]"
+    head = ("", f"following error, rms [{si}]", "", "less by [%]", f"largest [{si}]", most)
+    return joined((filled_table(head, rows), drawn.put(_error_chart(followed, view)), sentences(followed.notes, axis)))
+
+
+def _error_chart(followed: Followed, view: View) -> Chart:
+    curves = (("before", followed.error_before), ("after", followed.error_after))
+    traces = tuple(series(followed.time, error, name, ROLES[name]) for name, error in curves)
+    panel = Panel(f"following error [{unit(followed.unit, view.axis)}]", traces)
+    text = f"Command minus motion of the simulated loop on {followed.record}, as it is and with the tables."
+    return Chart("following-error", "time [s]", (panel,), text, height=300, shared=True)
 
 
 def _mended(do: Remedies, view: View) -> Html:
