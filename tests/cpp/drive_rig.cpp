@@ -392,14 +392,17 @@ using rig_controller::clamp;
 
 // One run of n samples of the controller. `command` drives the loop; where it is null, `given` is the torque command of an open
 // loop. `measured`, where given, is what the controller reads instead of the velocity (a replay).
+// table: what the controller adds beforehand, as drive_rig_controller.hpp has it, or null.
 // Returns 0, or 1 where the drive ran away. load: whose effects of the shaft act at the load.
 extern "C" int drive_rig_run(const Drive* drive, const Drive* load, const rig_controller::Settings* settings,
                              const double* filters, int filter_count, int n, double dt, int substeps, const double* command,
                              const double* given, const double* measured, const double* velocity_noise,
-                             const double* torque_noise, double* velocity, double* torque, double* position, double* truth) {
+                             const double* torque_noise, const double* table, double* velocity, double* torque, double* position,
+                             double* truth) {
     const Drive& d = *drive;
     Rig rig(d, *load);
-    rig_controller::Controller controller(*settings, filters, filter_count, command, n, dt, d.integrator_limit, d.command_rate);
+    rig_controller::Controller controller(*settings, filters, filter_count, command, n, dt, d.integrator_limit, d.command_rate,
+                                          table);
     std::vector<double> acted(static_cast<std::size_t>(n));
     const auto at = [&](int i) { return i < 0 ? 0.0 : acted[static_cast<std::size_t>(i)]; };
     const int whole = static_cast<int>(d.delay / dt + 1e-12);

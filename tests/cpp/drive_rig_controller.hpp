@@ -3,7 +3,8 @@
 //   position    r = kv (q* - q) + kff v*       at every position_every-th sample, held between;  without kv: r is the command
 //   filters     r -> command filters -> rate limit -> r',   measured velocity -> velocity filters -> w,   e = r' - w
 //   integral    I(n) = I(n-1) + ki T (newest e(n) + (1 - newest) e(n-1)),   |I| <= integrator_limit,   e(-1) = 0
-//   torque      v = kp (weight r' - w) + I + aff a* + fff sign(v*),   |u| <= torque_limit,   u -> torque filters
+//   torque      v = kp (weight r' - w) + I + aff a* + fff sign(v*) + table,   |u| <= torque_limit,   u -> torque filters
+//   table       f(v*) + viscous v* + constant + inertia a* + g(theta), both looked up in rows of numbers
 //
 // v*: slope of the position command over the coming position period, or the velocity command; a*: slope of v*.
 #pragma once
@@ -31,6 +32,35 @@ struct Settings {  // neutral values: a bare PI
     double aff = 0;             // N m s2/rad
     double fff = 0;             // N m
     // end of fields
+};
+
+// Torque that is added beforehand, from numbers alone: viscous, constant, inertia, turn, m, k, then m velocities (ascending, and
+// through 0), m torques there, and k torques evenly over a turn.
+class Table {
+public:
+    explicit Table(const double* numbers) : given(numbers) {}
+
+    double by_motion(double v, double a) const {
+        if (!given) return 0;
+        const int m = static_cast<int>(given[4]);
+        const double *at = given + 6, *level = at + m;
+        double f = v <= at[0] ? level[0] : level[m - 1];
+        for (int i = 1; i < m; ++i)
+            if (at[i - 1] < v && v <= at[i]) f = level[i - 1] + (v - at[i - 1]) / (at[i] - at[i - 1]) * (level[i] - level[i - 1]);
+        return f + given[0] * v + given[1] + given[2] * a;
+    }
+
+    double by_angle(double angle) const {
+        const int k = given ? static_cast<int>(given[5]) : 0;
+        if (k == 0) return 0;
+        const double* level = given + 6 + 2 * static_cast<int>(given[4]);
+        const double place = (angle / given[3] - std::floor(angle / given[3])) * k;
+        const int i = static_cast<int>(place) % k;
+        return level[i] + (place - std::floor(place)) * (level[(i + 1) % k] - level[i]);
+    }
+
+private:
+    const double* given;
 };
 
 // y(n) = b0 x(n) + b1 x(n-1) + b2 x(n-2) - a1 y(n-1) - a2 y(n-2)
@@ -68,8 +98,14 @@ public:
     // `filters`: `count` rows (place, kind, three numbers). place 0 command, 1 velocity, 2 torque; kind 0 low pass (tau),
     // 1 notch (Hz, zn, zd). `command`: n values at the controller's clock.
     Controller(const Settings& settings, const double* filters, int count, const double* command, int n, double period,
-               double integrator_limit, double command_rate)
-        : c(settings), source(command), n(n), T(period), integrator_limit(integrator_limit), command_rate(command_rate) {
+               double integrator_limit, double command_rate, const double* table)
+        : c(settings),
+          source(command),
+          n(n),
+          T(period),
+          integrator_limit(integrator_limit),
+          command_rate(command_rate),
+          table(table) {
         for (int i = 0; i < count; ++i) {
             const double* row = filters + 5 * i;
             chains[static_cast<int>(row[0])].push_back(row[1] == 0 ? Filter::low_pass(row[2], T)
@@ -85,7 +121,7 @@ public:
         const double before = integral;
         integral = clamp(integral + c.ki * T * (c.newest * error + (1 - c.newest) * last_error), integrator_limit);
         last_error = error;
-        const double rest = c.kp * (c.weight * reference - w) + added;
+        const double rest = c.kp * (c.weight * reference - w) + added + table.by_angle(angle);
         double wanted = rest + integral;
         double u = clamp(wanted, c.torque_limit);
         if (c.hold != 0 && (wanted > u ? error > 0 : wanted < u && error < 0)) {
@@ -102,6 +138,7 @@ private:
     const double* source;
     int n;
     double T, integrator_limit, command_rate;
+    Table table;
     std::vector<Filter> chains[3];
     double integral = 0, last_error = 0, reference = 0;
     double held = 0, added = 0;  // velocity command and feedforward torque until they are made again
@@ -129,7 +166,7 @@ private:
             a = ((at(i + 2 * m) - at(i + m)) / span - v) / span;
             held = c.position_gain * (source[i] - angle) + c.kff * v;
         }
-        added = c.aff * a + c.fff * static_cast<double>((v > 0) - (v < 0));
+        added = c.aff * a + c.fff * static_cast<double>((v > 0) - (v < 0)) + table.by_motion(v, a);
     }
 };
 

@@ -11,6 +11,7 @@ from gaident.arguments import arg
 from gaident.axis import TURN, Text, joined, message_of, say
 from gaident.axis import called as name_in_words
 from gaident.checks import size_of_drive
+from gaident.control.controller import Controller, checked_controller
 from gaident.data.record import Record
 from gaident.diagnosis.library.cause import Cause
 from gaident.diagnosis.library.terms import LIBRARY
@@ -38,6 +39,7 @@ def feedforward(
     points: int = POINTS,
     angles: int = ANGLES,
     rec: Record | None = None,
+    controller: Controller | None = None,
 ) -> FeedforwardTables:
     """Return what a drive can add to the torque beforehand: friction by velocity, gravity and cogging by angle, inertia.
 
@@ -58,6 +60,8 @@ def feedforward(
         Angles of a turn, of a linear axis of the longest period, from 2 to 10000.
     rec : Record, optional
         The record whose command is simulated; None: the longest of those of the result, which a loaded result does not have.
+    controller : PI or Cascade, optional
+        The loop in which it is simulated; None: that of the result.
 
     Returns
     -------
@@ -67,7 +71,8 @@ def feedforward(
     Raises
     ------
     SettingsError
-        For something else than a diagnosis or a record, numbers out of their range, and no speed where there is no record.
+        For something else than a diagnosis, a record or a controller with known gains, numbers out of their range, and no speed
+        where there is no record.
 
     Examples
     --------
@@ -98,6 +103,9 @@ def feedforward(
             raise SettingsError(f"{name} is {count!r}: give a whole number from {FEWEST} to {MOST}")
     if rec is not None and not isinstance(rec, Record):
         raise SettingsError(f"rec is {type(rec).__name__}: give the gaident.Record whose command is to be simulated, or None")
+    given = checked_controller(controller)
+    if given is not None and given.unknown:
+        raise SettingsError(f"controller has {given.unknown[0]}=None: give a number, for its loop is simulated")
     highest = _speed_of(result.records if rec is None else (*result.records, rec), speed)
     one_way = np.geomspace(LOWEST * highest, highest, points)
     velocity = np.concatenate([-one_way[::-1], one_way])
@@ -130,7 +138,7 @@ def feedforward(
         axis=result.axis,
     )
     try:
-        return replace(tables, following=following_error(result, tables, rec))
+        return replace(tables, following=following_error(result, tables, rec, controller))
     except GaidentError as reason:
         return replace(tables, no_following=message_of(reason))
 

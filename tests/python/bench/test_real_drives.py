@@ -14,7 +14,8 @@ from numpy.typing import NDArray
 import gaident as ga
 from gaident.diagnosis.gains import start_state
 from gaident.models.drive_torque import as_old_as_its_velocity
-from measured import FILES, emps_record, folder
+from measured import EMPS_GAIN, FILES, emps_record, folder
+from places import ROOT
 
 Vector = NDArray[np.float64]
 
@@ -125,6 +126,40 @@ def test_emps_nothing_is_accepted_that_makes_the_other_record_worse(emps: ga.Dia
 
 def test_emps_is_searched_in_bounded_work(emps: ga.Diagnosis) -> None:
     assert emps.samples == 24841 and emps.simulations < 45_000  # 8 s of one core; on all samples throughout it were 60
+
+
+@pytest.mark.long
+def test_emps_following_error_with_the_tables(emps: ga.Diagnosis, data_dir: Path) -> None:
+    """The loop of EMPS, its own gains from the file, simulated on its command; the page has the figures."""
+    from scipy.io import loadmat
+
+    path = folder(data_dir, "emps") / FILES[0]
+    file = loadmat(path)
+    kp, kv, gain = (float(file[name].item()) for name in ("kp", "kv", "gtau"))
+    measured = emps_record(path)
+    position, asked = measured.position, file["qg"].ravel()
+    assert gain == EMPS_GAIN and position is not None and measured.torque is not None
+    # The law, without a model: u = kv (kp (q* - q) - w), w the difference of the angle over two lines.
+    velocity = (position[2:] - position[:-2]) / (2.0 * measured.dt)
+    left = gain * kv * (kp * (asked - position)[2:] - velocity) - measured.torque[2:]
+    assert np.std(left) < 0.0025 * np.std(measured.torque)  # the steps of the log, 0.13 N
+    # (1 + z^-1)/2 behind a difference over one line is a notch at half the sampling frequency.
+    edge = 0.499 / measured.dt
+    mean = ga.Notch(edge, 0.0, 0.5 * np.tan(np.pi * edge * measured.dt))
+    loop = ga.Cascade(ga.PI(kp=kv * gain, ki=0.0), position=ga.P(kp), velocity_filters=(mean,))
+    rest = 2662  # the first standstill: the log begins in motion, the simulation does not
+    rec = measured.with_channels(position_command=asked)[rest:]
+    found = ga.feedforward(emps, rec=rec, controller=loop).following
+    assert found is not None and found.measured is not None and found.with_velocity is not None
+    assert found.before.rms == pytest.approx(found.measured.rms, rel=2e-3)
+    assert found.before.largest == pytest.approx(found.measured.largest, rel=5e-3)
+    assert not [name for name, value in found.to_dict().items() if value is None]
+    page = (ROOT / "docs" / "how-to" / "feedforward.md").read_text(encoding="utf-8")
+    for name, one, fall in found.loops:
+        less = "" if fall is None else f"{100.0 * fall:.0f} %"
+        row = f"| {name} | {1e6 * one.rms:.4g} | {less} | {1e6 * one.largest:.4g} | {one.torque:.3g} |"
+        print(row)
+        assert row in page, row
 
 
 @pytest.mark.long

@@ -46,14 +46,37 @@ def test_retune_prints_and_saves(here: Path, result: ga.Diagnosis, capsys: pytes
     assert data["schema"] == "gaident/retuning" and data["after"]["stiffness"]["unit"] == "N/m"
 
 
+COLUMNS = {"command": "r", "velocity": "w", "torque": "M"}
+UNITS = {"command": "rad/s", "velocity": "rad/s", "torque": "Nm"}
+
+
+def write_log(rec: ga.Record) -> list[str]:
+    """The record as a log to the last digit, run.csv, and the options that read it."""
+    assert rec.command is not None and rec.torque is not None
+    columns = np.column_stack([rec.command, rec.velocity, rec.torque])
+    np.savetxt("run.csv", columns, delimiter=",", header=",".join(COLUMNS.values()), comments="", fmt="%.17g")
+    told = [",".join(f"{channel}={value}" for channel, value in given.items()) for given in (COLUMNS, UNITS)]
+    return ["run.csv", "--columns", told[0], "--units", told[1], "--dt", "1e-3"]
+
+
 def test_feedforward_prints_and_writes(here: Path, result: ga.Diagnosis, capsys: pytest.CaptureFixture[str]) -> None:
-    tables = ga.feedforward(result, speed=30.0, points=8)
-    assert main(["feedforward", "run.json", "--speed", "30", "--points", "8", "--csv", "t.csv", "--c", "t.c"]) == 0
+    """With its log the command prints what the package says of the whole result; a saved one has no samples."""
+    log, sizes = write_log(result.records[0]), ["--speed", "30", "--points", "8"]
+    rec = ga.read("run.csv", COLUMNS, UNITS, dt=1e-3)
+    tables, own = ga.feedforward(result, speed=30.0, points=8, rec=rec), ga.feedforward(result, speed=30.0, points=8)
+    assert tables.following is not None and own.following is not None and tables.following.after == own.following.after
+    assert main(["feedforward", "run.json", *log, *sizes, "--csv", "t.csv", "--c", "t.c"]) == 0
     assert capsys.readouterr().out == f"{tables.summary()}\nwritten: t.csv\nwritten: t.c\n"
-    assert Path("t.c").read_text() == tables.to_c(None, "t")
+    assert Path("t.c").read_text() == own.to_c(None, "t")
     assert len(Path("t.csv").read_text().splitlines()) == 1 + 3 + 16
+    loaded = ga.load("run.json")
+    assert isinstance(loaded, ga.Diagnosis) and main(["feedforward", "run.json", *sizes]) == 0
+    said = capsys.readouterr().out
+    assert said == f"{ga.feedforward(loaded, speed=30.0, points=8).summary()}\n"
+    assert said.endswith("not simulated: the result is a loaded one and has no records.\n")
     assert main(["feedforward", "run.json", "--speed", "30", "--json"]) == 0
-    assert json.loads(capsys.readouterr().out)["schema"] == "gaident/feedforward"
+    data = json.loads(capsys.readouterr().out)
+    assert data["schema"] == "gaident/feedforward" and data["following"] is None
 
 
 SPEEDS_LOG = ["speeds.csv", "--columns", "time=t,velocity=w,torque=M", "--unit", "time=s,velocity=rad/s,torque=Nm"]

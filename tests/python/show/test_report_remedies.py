@@ -77,6 +77,19 @@ def test_the_table_of_repairs_is_that_of_the_simulations(dia: ga.Diagnosis, fast
     assert found.retuned == error(ga.simulate(dia.model, rec, tuned.controller))
 
 
+def test_the_feedforward_has_the_following_error_before_and_after(dia: ga.Diagnosis, fast: None) -> None:
+    text, found = chapter(dia), ga.feedforward(dia).following
+    assert found is not None and "Feedforward" in text and "as it is, simulated" in text
+    part = text[text.rindex("Feedforward") : text.rindex("If mended")]
+    for loop in (found.before, found.after):
+        assert f"{loop.rms:.4g}" in part and f"{loop.largest:.4g}" in part
+    assert "the model that the tables are made of" in part
+    assert "following-error" in charts_of(report_page(dia))["charts"]
+    unlike = replace(dia, loop_follows=False)
+    assert "What the tables bring is not simulated: the logged torque does not follow" in chapter(unlike)
+    assert "following-error" not in charts_of(report_page(unlike))["charts"]
+
+
 def test_the_first_line_says_that_a_model_is_contradicted(dia: ga.Diagnosis, fast: None) -> None:
     text = chapter(replace(dia, verdict="partly explained", driver="velocity"))
     begin = text.removeprefix("What to do").strip()

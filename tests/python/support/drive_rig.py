@@ -191,7 +191,7 @@ def library() -> ctypes.CDLL:
     loaded = compiled.library(SOURCE)
     pointer = ctypes.POINTER(ctypes.c_double)
     integer = ctypes.c_int
-    loaded.drive_rig_run.argtypes = [*[pointer] * 4, integer, integer, ctypes.c_double, integer, *[pointer] * 9]
+    loaded.drive_rig_run.argtypes = [*[pointer] * 4, integer, integer, ctypes.c_double, integer, *[pointer] * 10]
     return loaded
 
 
@@ -299,11 +299,13 @@ def run_drive(
     torque_noise: Array | None = None,
     encoder: float = 0.0,
     differenced: bool = False,
+    table: Array | None = None,
     substeps: int = SUBSTEPS,
 ) -> Log:
     """Simulate from rest, at the controller's clock: every array has `plant.log_every` values to a line of the log.
 
     `torque` without a command: open loop; `measured`: the controller reads this (a replay).
+    `table`: numbers of the torque that the controller adds beforehand, as drive_rig_controller.hpp has them.
     """
     values, at_load = drive_values(plant, effects or {})
     values.update(encoder=encoder, differenced=float(differenced))
@@ -342,6 +344,7 @@ def run_drive(
         period,
         max(substeps_for(each, period, least) for each in (values, at_load)),
         *map(pointer, given),
+        None if table is None else address(table),
         *map(pointer, out),
     )
     if failed:

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import math
 import textwrap
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
@@ -16,16 +17,16 @@ __all__ = ["FollowingError", "LoopError"]
 
 Vector = NDArray[np.float64]
 
-BEFORE, AFTER, FED = "as it is", "with the tables", "and with the whole velocity feedforward"
+MEASURED, BEFORE, AFTER, FED = "measured", "as it is, simulated", "with the tables", "and with the whole velocity feedforward"
 SIMULATED = (
-    "Simulated from rest and without noise, with the command of {} and the model that the tables are made of: what that model lacks "
-    "does not show. Friction is added by the velocity of the command, the {inertia} by its acceleration, gravity and cogging by the "
-    "simulated {angle}."
+    "Simulated from rest and without noise, with the command of {} and the model that the tables are made of: what that model "
+    "lacks does not show. Friction is added by the velocity of the command, the {inertia} by its acceleration, gravity and "
+    "cogging by the simulated {angle}."
 )
 REPLACED = "The tables stand in the place of the controller's own feedforward of acceleration and friction."
 BLOW = (
-    "With the tables the loop asks for more than twice the {torque} of before, for the acceleration of a command that jumps: where the "
-    "drive cannot give that, it follows less well than this."
+    "With the tables the loop asks for more than twice the {torque} of before, for the acceleration of a command that jumps: "
+    "where the drive cannot give that, it follows less well than this."
 )
 LAG = (
     "A position controller without the whole velocity feedforward lags behind a moving command by its velocity over the position "
@@ -42,7 +43,7 @@ class LoopError:
     rms, largest : float
         Root mean square and largest size [rad/s], of a loop with a position controller [rad].
     torque : float
-        Largest size of the torque that the loop asks for [N m].
+        Largest size of the torque that the loop asks for [N m]; not a number where the record has none.
 
     See Also
     --------
@@ -66,6 +67,8 @@ class FollowingError:
         Name of the record.
     unit : {"rad/s", "rad"}
         Unit of the errors; "rad" of a loop with a position controller.
+    measured : LoopError or None
+        What the record itself has, with its noise; None where it lacks the motion that the command is one of.
     before : LoopError
         With the controller as it is.
     after : LoopError
@@ -86,6 +89,7 @@ class FollowingError:
 
     record: str
     unit: str
+    measured: LoopError | None
     before: LoopError
     after: LoopError
     with_velocity: LoopError | None
@@ -95,10 +99,15 @@ class FollowingError:
     error_after: Vector
 
     @property
-    def loops(self) -> tuple[tuple[str, LoopError], ...]:
-        """What each loop is called, in the order of the summary."""
-        fed = () if self.with_velocity is None else ((FED, self.with_velocity),)
-        return (BEFORE, self.before), (AFTER, self.after), *fed
+    def loops(self) -> tuple[tuple[str, LoopError, float | None], ...]:
+        """The rows of the summary: what each is called, its errors, and the share by which its rms is less than `before`."""
+        told = (
+            (MEASURED, self.measured, False),
+            (BEFORE, self.before, False),
+            (AFTER, self.after, True),
+            (FED, self.with_velocity, True),
+        )
+        return tuple((name, one, self._fall(one) if changed else None) for name, one, changed in told if one is not None)
 
     @property
     def notes(self) -> tuple[str, ...]:
@@ -111,13 +120,12 @@ class FollowingError:
         more = [say(text) for text, there in told if there]
         return (say(SIMULATED, self.record), *more)
 
-    def fall(self, loop: LoopError) -> float:
-        """Share by which a loop's rms error is less than before."""
+    def _fall(self, loop: LoopError) -> float:
         return 1.0 - loop.rms / self.before.rms if self.before.rms > 0.0 else 0.0
 
     def to_dict(self) -> dict[str, Any]:
         """Return the figures as plain data for JSON, without the curves."""
-        loops = {name: _plain(getattr(self, name)) for name in ("before", "after", "with_velocity")}
+        loops = {name: _plain(getattr(self, name)) for name in ("measured", "before", "after", "with_velocity")}
         return {"record": self.record, "unit": self.unit, **loops, "notes": list(self.notes)}
 
     def lines(self, axis: str) -> list[str]:
@@ -125,11 +133,11 @@ class FollowingError:
         si, torque = unit(self.unit, axis), unit("N m", axis)
         most = f"largest {word('torque', axis)} [{torque}]"
         rows: list[tuple[str, ...]] = [("following error", f"rms [{si}]", "less by [%]", f"largest [{si}]", most)]
-        for name, loop in self.loops:
-            less = "" if loop is self.before else percent(self.fall(loop)).removesuffix(" %")
+        for name, loop, fall in self.loops:
+            less = "" if fall is None else percent(fall).removesuffix(" %")
             rows.append((name, number(loop.rms), less, number(loop.largest), number(loop.torque)))
         return [*table(rows), *(line for note in self.notes for line in textwrap.wrap(said(note, axis), WIDTH))]
 
 
 def _plain(loop: LoopError | None) -> dict[str, float] | None:
-    return None if loop is None else {"rms": loop.rms, "largest": loop.largest, "torque": loop.torque}
+    return None if loop is None else {name: value for name, value in asdict(loop).items() if math.isfinite(value)}

@@ -13,6 +13,7 @@ agree with the loop at one sample more each, and at all of them where u no longe
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -21,6 +22,7 @@ from numpy.typing import NDArray
 from gaident.axis import say
 from gaident.control import core
 from gaident.control.cascade import Cascade, cascade_of
+from gaident.control.controller import Controller
 from gaident.control.differencing import older
 from gaident.data.record import Record
 from gaident.errors import GaidentError
@@ -47,18 +49,24 @@ MOST_RUNS = 200  # no decision: of a solver: a loop that follows needs some 10
 SETTLED = 1e-9  # no decision: of a solver: of the waves' amplitudes
 
 
-def following_error(result: Diagnosis, tables: FeedforwardTables, rec: Record | None = None) -> FollowingError:
-    """What the tables bring on a record; None: the longest of the result. Raises GaidentError with the reason why not."""
-    if result.controller is None:
+def following_error(
+    result: Diagnosis, tables: FeedforwardTables, rec: Record | None = None, controller: Controller | None = None
+) -> FollowingError:
+    """What the tables bring; raises GaidentError with the reason why that cannot be simulated.
+
+    rec: None: the longest of the result. controller: the loop that they are added in; None: that of the result.
+    """
+    given = result.controller if controller is None else controller
+    if given is None:
         raise GaidentError(NO_CONTROLLER)
     if rec is None and not result.records:
         raise GaidentError(NO_RECORD)
-    if not result.loop_follows:
+    if controller is None and not result.loop_follows:
         raise GaidentError(NOT_THE_LOOP)
-    if result.controller.loop == "continuous":
+    if given.loop == "continuous":
         raise GaidentError(CONTINUOUS)
-    chosen = timed_record(max(result.records, key=len) if rec is None else rec, result.controller)
-    loop = _Loop.of(result, chosen)
+    rec = timed_record(max(result.records, key=len) if rec is None else rec, given)
+    loop = _Loop.of(result, rec, given)
     bare = replace(loop.cascade, acceleration_feedforward=0.0, friction_feedforward=0.0)
     before = loop.run(loop.cascade, None)
     after = loop.run_with(bare, tables)
@@ -66,16 +74,28 @@ def following_error(result: Diagnosis, tables: FeedforwardTables, rec: Record | 
     if loop.placed and bare.velocity_feedforward < 1.0:
         fed = loop.figures(loop.run_with(replace(bare, velocity_feedforward=1.0), tables))
     return FollowingError(
-        record=chosen.name or "the record",
+        record=rec.name or "the record",
         unit="rad" if loop.placed else "rad/s",
+        measured=_measured(rec, loop.placed),
         before=loop.figures(before),
         after=loop.figures(after),
         with_velocity=fed,
         replaced=bare != loop.cascade,
-        time=chosen.time,
+        time=rec.time,
         error_before=loop.error(before),
         error_after=loop.error(after),
     )
+
+
+def _measured(rec: Record, placed: bool) -> LoopError | None:
+    """The record's own following error."""
+    command, motion = (rec.position_command, rec.position) if placed else (rec.command, rec.velocity)
+    return None if command is None or motion is None else _figures(command - motion, rec.torque)
+
+
+def _figures(error: Vector, torque: Vector | None) -> LoopError:
+    most = math.nan if torque is None else float(np.max(np.abs(torque)))
+    return LoopError(float(np.sqrt(np.mean(error**2))), float(np.max(np.abs(error))), most)
 
 
 @dataclass(frozen=True, eq=False)
@@ -97,9 +117,8 @@ class _Loop:
     every: int
 
     @classmethod
-    def of(cls, result: Diagnosis, rec: Record) -> _Loop:
-        assert result.controller is not None
-        cascade = cascade_of(older(result.controller, result.velocity_age))
+    def of(cls, result: Diagnosis, rec: Record, controller: Controller) -> _Loop:
+        cascade = cascade_of(older(controller, result.velocity_age))
         source = cascade.source_of(rec)
         if source is None:
             raise GaidentError(NO_COMMAND)
@@ -152,5 +171,4 @@ class _Loop:
         return (self.command - (run.angle if self.placed else run.velocity))[:: self.every]
 
     def figures(self, run: _Run) -> LoopError:
-        error = self.error(run)
-        return LoopError(float(np.sqrt(np.mean(error**2))), float(np.max(np.abs(error))), float(np.max(np.abs(run.torque))))
+        return _figures(self.error(run), run.torque)

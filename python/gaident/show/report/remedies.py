@@ -177,10 +177,9 @@ def _brought(found: Beforehand, view: View, drawn: Charts) -> Html:
     if followed is None:
         return _reason("What the tables bring is not simulated", found.no_following, axis)
     si, torque = unit(followed.unit, axis), unit("N m", axis)
-    (_, now), *_ = followed.loops
     rows: list[Row] = []
-    for name, loop in followed.loops:
-        less = "" if loop is now or not now.rms > 0.0 else typeset(percent(1.0 - loop.rms / now.rms).removesuffix(" %"))
+    for name, loop, fall in followed.loops:
+        less = "" if fall is None else typeset(percent(fall).removesuffix(" %"))
         own = typeset(beside(view.scales, "", loop.rms, None, si))
         rows.append((name, number(loop.rms), own, less, number(loop.largest), number(loop.torque)))
     most = f"largest {word('torque', axis)} [{torque}]"
