@@ -154,7 +154,7 @@ def test_emps_following_error_with_the_tables(emps: ga.Diagnosis, data_dir: Path
     assert found.before.rms == pytest.approx(found.measured.rms, rel=2e-3)
     assert found.before.largest == pytest.approx(found.measured.largest, rel=5e-3)
     assert not [name for name, value in found.to_dict().items() if value is None]
-    page = (ROOT / "docs" / "how-to" / "feedforward.md").read_text(encoding="utf-8")
+    page = (ROOT / "docs/how-to/feedforward.md").read_text(encoding="utf-8")
     for name, one, fall in found.loops:
         less = "" if fall is None else f"{100.0 * fall:.0f} %"
         row = f"| {name} | {1e6 * one.rms:.4g} | {less} | {1e6 * one.largest:.4g} | {one.torque:.3g} |"

@@ -18,6 +18,7 @@ __all__ = ["FollowingError", "LoopError"]
 Vector = NDArray[np.float64]
 
 MEASURED, BEFORE, AFTER, FED = "measured", "as it is, simulated", "with the tables", "and with the whole velocity feedforward"
+TWICE = 2.0  # no decision: printed: what the sentence says
 SIMULATED = (
     "Simulated from rest and without noise, with the command of {} and the model that the tables are made of: what that model "
     "lacks does not show. Friction is added by the velocity of the command, the {inertia} by its acceleration, gravity and "
@@ -114,7 +115,7 @@ class FollowingError:
         """How it was simulated, in plain sentences."""
         told = (
             (REPLACED, self.replaced),
-            (BLOW, self.after.torque > 2.0 * self.before.torque),
+            (BLOW, self.after.torque > TWICE * self.before.torque),
             (LAG, self.with_velocity is not None),
         )
         more = [say(text) for text, there in told if there]
