@@ -65,7 +65,8 @@ def test_a_diagnosis_reads_from_verdict_to_how_it_was_computed(dia: ga.Diagnosis
         assert words in seen.text, words
     charts = charts_of(page)["charts"]
     wanted = {"run-0", "run-1", "missing-velocity", "missing-reversals", "missing-orders", "missing-place", "missing-time"}
-    assert set(charts) == wanted | {"residual-frequency", "response", "held-out-record", "loop", "loop-step", "next-command"}
+    wanted |= {"residual-frequency", "response", "held-out-record", "loop", "loop-step", "following-error", "next-command"}
+    assert set(charts) == wanted
     assert charts["missing-time"]["link"] == charts["run-0"]["link"] == "run-0"
     titles = [charts["run-0"]["layout"][f"yaxis{n}"]["title"]["text"] for n in ("", "2", "3")]
     assert titles == ["velocity [rad/s]", "error [rad/s]", "torque [N m]"]
