@@ -14,6 +14,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from html import escape
+from numbers import Real
 from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
@@ -69,7 +70,7 @@ def numbered(name: str, wave: int) -> str:
 def wave_of(name: str) -> tuple[str, int]:
     """(plain name, wave) of a parameter's name."""
     plain, _, number = name.rpartition("_")
-    return (plain, int(number)) if plain and number.isdigit() and int(number) > 1 else (name, 1)
+    return (plain, int(number)) if plain and number.isascii() and number.isdigit() and int(number) > 1 else (name, 1)
 
 
 def by_wave(parameters: Mapping[str, Value]) -> tuple[dict[str, Value], ...]:
@@ -214,6 +215,7 @@ def _one_by_one(row: Row, given: object) -> tuple[Row, object]:
     """(row of as many waves as are given, parameters with those of each wave under names of their own); raises ModelError."""
     if row.waves == 1 or not isinstance(given, Mapping):
         return row, given
+    given = {name: value[()] if isinstance(value, np.ndarray) and value.ndim == 0 else value for name, value in given.items()}
     lists = {name: list(value) for name, value in given.items() if isinstance(value, list | tuple | np.ndarray)}
     if lists:
         lengths = {name: len(value) for name, value in lists.items()}
@@ -227,9 +229,9 @@ def _one_by_one(row: Row, given: object) -> tuple[Row, object]:
         given = {numbered(name, k + 1): value[k] for k in range(count) for name, value in lists.items()}
     plain = {p.name for p in row.parameters}
     named = {name: wave_of(name) for name in given if isinstance(name, str)}
-    orders = {n: given[n] for n, (of, _) in named.items() if of == "order" and isinstance(given[n], int | float)}
+    orders = {n: given[n] for n, (of, _) in named.items() if of == "order" and isinstance(given[n], Real)}
     for name, value in orders.items():
-        first = next(n for n, other in orders.items() if other == value)
+        first = next((n for n, other in orders.items() if other == value), name)  # a value that is no number equals none
         if first != name:
             raise ModelError(f"{name} of {row.name} is {value:g}, as {first} is: give one wave of each order")
     count = max((wave for of, wave in named.values() if of in plain), default=1)

@@ -33,6 +33,8 @@ __all__ = ["LostTimes"]
 Vector = NDArray[np.float64]
 Matrix = NDArray[np.float64]
 
+ROUNDED = 1e-12  # no decision: exact to; of a variance, the least noise that is added
+
 
 @dataclass(frozen=True, eq=False)
 class LostTimes:
@@ -50,7 +52,6 @@ class LostTimes:
     def of(cls, steps: LineSteps, share: Vector, off: Vector, others: Matrix, pulse: Vector, rounding: float) -> LostTimes:
         """share (m,): s_i0; off (n - 1,): steps of what the numbers found so far leave [N m], rounding: the least noise [N m];
         others (k, n - 1): what other velocities between the lines change of the steps [N m]; pulse: see `LineSteps.columns`."""
-        from scipy.linalg import cholesky_banded
         from scipy.sparse import diags_array
 
         noise = steps.noise_of(off, rounding)
@@ -62,7 +63,7 @@ class LostTimes:
         band = np.zeros((int(below.max(initial=0)) + 1, C.shape[0]))
         low = below >= 0
         band[below[low], cov.col[low]] = cov.data[low]
-        factor = cholesky_banded(band, lower=True)
+        factor = _factor_of(band)
         made = cls(steps, noise, rows, C, factor, np.zeros(C.shape[0]))
         expected = made._solved((C @ (steps.unsure.usual - share))[:, None])[:, 0] * noise.std
         return cls(steps, noise, rows, C, factor, expected)
@@ -90,3 +91,17 @@ class LostTimes:
 
         solved: Matrix = dtbtrs(self.factor, rows, uplo="L", trans=trans)[0]
         return solved
+
+
+def _factor_of(band: Matrix) -> Matrix:
+    """L of a covariance L L' in lower banded form; where rounding leaves it no covariance, with more noise in every step."""
+    from scipy.linalg import cholesky_banded
+
+    more = 0.0
+    while True:
+        try:
+            return np.asarray(cholesky_banded(np.concatenate([band[:1] * (1.0 + more), band[1:]]), lower=True))
+        except np.linalg.LinAlgError:
+            if not more < 1.0 or not np.all(np.isfinite(band)):
+                raise
+            more = max(10.0 * more, ROUNDED)

@@ -11,7 +11,7 @@ reset       I begins at 0 in a sample in which the command changes its sign, or 
 The number is that with the least squares of logged minus made torque at the lines, without its correlation from line to line.
 A law is shown where what is left is no more than what the velocity between the lines can make (`logged_torque.off_by`).
 Of a log with a line for each of the controller's samples nothing is lost: a law is shown where the torques follow to the rounding
-of the log (`replay.Allowed`), or to white noise of a measured torque.
+of the log (`replay.Allowed`), or to white noise of a torque that was measured.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ from gaident.control.simplest import simplest
 from gaident.control.smoothing import expected_at
 from gaident.control.ticks import straight_between
 from gaident.data.record import Record
-from gaident.data.torque_kind import MEAN
+from gaident.data.torque_kind import MEAN, MEASURED
 from gaident.identification.logged_stretches import Log, log_of, plateau_of
 from gaident.identification.logged_torque import comparable, not_followed, off_by, tells_of_controller
 from gaident.identification.replay.causes import white_noise
@@ -165,7 +165,7 @@ def scheme_shown(records: Sequence[Record], controller: Cascade) -> SchemeShown 
     if not records:
         return None
     kept = _KEPT.setdefault(records[0], {})
-    key = (*records[1:], controller)
+    key = (*(r.digest for r in records[1:]), controller)
     if key not in kept:
         kept[key] = _shown(records, controller)
     return kept[key]
@@ -195,6 +195,10 @@ def _shown(records: Sequence[Record], controller: Cascade) -> SchemeShown | None
         return None
     at_limit = [] if pi.torque_limit is None else [replace(pi, anti_windup="hold")]
     known = [controller, bare, *(replace(bare, velocity=one) for one in at_limit)]
+    if at_rate and any(
+        all(_follows_exactly(r, log, log.made(one), one) for r, log in zip(records, whole, strict=True)) for one in known
+    ):
+        return None  # what a `PI` has explains the torques
     before = min(_rms([log.torque - log.made(one) for log in logs]) for one in known)
     kinds = _kinds(pi, closer)
     found = min((_fitted(logs, kind, variant, bare) for kind, variant in kinds), key=lambda one: one[0], default=None)
@@ -209,11 +213,14 @@ def _shown(records: Sequence[Record], controller: Cascade) -> SchemeShown | None
         if again[0] < POLICY.each_number * left:
             (left, scheme), bare = again, other
     scheme, std = _number(logs, scheme, bare, at_rate)
+    if at_rate:
+        scheme, std = _as_the_log_tells(records, whole, scheme, bare, std)
     left = _rms(_left(logs, scheme, bare))
     made_of = _exact if at_rate else _follows
     follows = closer or all(made_of(rec, log, scheme, bare) for rec, log in zip(records, whole, strict=True))
     decays = not closer or 1.0 - scheme.number > POLICY.check_deviations * std
-    if not (follows and decays and left < POLICY.each_number * before):
+    part = float(np.sqrt(POLICY.replay_left)) if at_rate else POLICY.each_number
+    if not (follows and decays and left < part * before):
         return None
     return SchemeShown(scheme, bare, std, before, left, sum(len(log.torque) for log in logs), closer)
 
@@ -225,9 +232,45 @@ def _follows(rec: Record, log: Log, scheme: Scheme, controller: Cascade) -> bool
 
 def _exact(rec: Record, log: Log, scheme: Scheme, controller: Cascade) -> bool:
     """Whether the torque of a log at the controller's rate follows, as one that is replayed has to (`replay`)."""
-    pi, off = controller.velocity, log.torque - _made(scheme, controller, log)
-    allowed = (Allowed.of(rec, log.command, pi, log.torque, step) for (step,) in velocity_steps([rec]))
-    return any(one(off, pi.limits) for one in allowed) or white_noise(off, log.torque) > 0.0
+    return _follows_exactly(rec, log, _made(scheme, controller, log), controller)
+
+
+def _follows_exactly(rec: Record, log: Log, made: Vector, controller: Cascade) -> bool:
+    pi, off = controller.velocity, log.torque - made
+    measured = rec.torque_is == MEASURED and white_noise(off, log.torque) > 0.0
+    return measured or any(one(off, pi.limits) for one in _allowed(rec, log, pi))
+
+
+def _allowed(rec: Record, log: Log, pi: PI) -> list[Allowed]:
+    return [Allowed.of(rec, log.command, pi, log.torque, step) for (step,) in velocity_steps([rec])]
+
+
+def _as_the_log_tells(
+    records: Sequence[Record], logs: Sequence[Log], scheme: Scheme, controller: Cascade, std: float
+) -> tuple[Scheme, float]:
+    """(the law, the deviation of its number) of a log with every sample, by what its rounding leaves open.
+
+    An integral that is held, where the torques follow from that too.
+    A dead band that counts all of a larger error lies anywhere between two errors that occur.
+    Another number is told by the torque only where what it changes is more than rounding may make.
+    """
+    if scheme.kind == RESET:
+        return scheme, std
+    held = Scheme(DECAY, "", 1.0)
+    if scheme.kind == DECAY and all(_exact(r, log, held, controller) for r, log in zip(records, logs, strict=True)):
+        return held, 0.0
+    if scheme.variant == "whole":
+        sizes = np.sort(np.concatenate([np.abs(log.command - log.velocity) for log in logs]))
+        at = int(np.searchsorted(sizes, scheme.number))
+        low, high = float(sizes[max(at - 1, 0)]), float(sizes[min(at, len(sizes) - 1)])
+        # no decision: a formula: an even distribution
+        return replace(scheme, number=0.5 * (low + high)), max(std, (high - low) / float(np.sqrt(12.0)))
+    step = _step(scheme)
+    up, down = (replace(scheme, number=scheme.number + by) for by in (step, -step))
+    slope = np.concatenate([(_made(up, controller, log) - _made(down, controller, log)) / (2.0 * step) for log in logs])
+    power = float(np.sqrt(np.mean(slope**2)))
+    rounding = max(min(one.torque for one in _allowed(r, log, controller.velocity)) for r, log in zip(records, logs, strict=True))
+    return scheme, max(std, rounding / power) if power > 0.0 else np.inf
 
 
 def _kinds(pi: PI, decays: bool) -> Iterator[tuple[str, str]]:

@@ -9,7 +9,7 @@ A diagnosis asks for the replay of a record in several places: each is kept for 
 from __future__ import annotations
 
 from collections.abc import MutableMapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from weakref import WeakKeyDictionary
 
 import numpy as np
@@ -151,7 +151,8 @@ def _compared(rec: Record, command: Vector, controller: Controller, logged: Vect
     if pi is None:
         text = say("{}. Is this the controller, and are these the signals it saw?", head)
         return Replay(*figures, False, "", np.nan, departs, text)
-    error = control_error(off, pi, rec.dt)
+    reached = float(np.abs(logged).max()) >= POLICY.at_limit * pi.limits[0]
+    error = control_error(off, pi if reached else replace(pi, torque_limit=None), rec.dt)
     if error is not None and (noise := white_noise(error, rec.velocity)):
         text = say("{}. It does from a velocity that is off the logged one by white noise of {:.2g} {rad/s} rms.", head, noise)
         return Replay(*figures, False, "", np.nan, departs, text, velocity_noise=noise)

@@ -282,7 +282,10 @@ def _fitted(rows: tuple[Cause, ...], starts: Sequence[Vector], w: Vector, torque
     effect = np.linalg.norm(best.slopes(w, scales) / std[:, None], axis=0)
     for bound in (low, high):  # the solver stays inside
         near = np.isfinite(bound) & (effect * np.abs(best.x - np.where(np.isfinite(bound), bound, 0.0)) < SNAP) & (effect > 0.0)
-        best = _Law(rows, np.where(near, bound, best.x), best.chi2)
+        at_bound = np.where(near, bound, best.x)
+        left = float(np.sum(((torque - law.torque(w, at_bound)) / std) ** 2))
+        if left < best.chi2 + SNAP:
+            best = _Law(rows, at_bound, left)
     return best
 
 
