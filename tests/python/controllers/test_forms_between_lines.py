@@ -7,10 +7,12 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scipy.linalg import cholesky_banded
 from threadpoolctl import threadpool_limits
 
 import gaident as ga
 from drive_rig import skip_without_library
+from gaident.diagnosis.controller import lost_times
 from gaident.diagnosis.controller.form_findings import loop_of
 from gaident.diagnosis.controller.forms import form_shown
 from gaident.identification.replay.command_timing import timed
@@ -115,3 +117,12 @@ def test_gains_that_were_not_given_are_estimated_with_the_times() -> None:
     assert loop.controller is not None
     (known,) = timed([rec], loop.controller)
     assert isinstance(known, TimedRecord) and np.ptp(known.command_between - rec.command[:, None], axis=1).max() > 1.0
+
+
+def test_a_covariance_that_rounding_makes_none_gets_more_noise() -> None:
+    """Two steps that depend wholly on each other, as in a log without noise; a sure one keeps every bit."""
+    whole = lost_times._factor_of(np.array([[1.0, 1.0], [1.0, 0.0]]))
+    lower = np.array([[whole[0, 0], 0.0], [whole[1, 0], whole[0, 1]]])
+    np.testing.assert_allclose(lower @ lower.T, np.ones((2, 2)), atol=1e-11)
+    sure = np.array([[2.0, 3.0], [1.0, 0.0]])
+    np.testing.assert_array_equal(lost_times._factor_of(sure), cholesky_banded(sure, lower=True))

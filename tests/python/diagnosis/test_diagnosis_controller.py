@@ -65,6 +65,15 @@ def test_a_velocity_that_the_log_alone_has_noise_on_asks_for_no_form_of_controll
     assert driver_of([rec], [], CONTROLLER) is None
 
 
+def test_a_limit_that_is_not_reached_hides_no_noise_of_the_log() -> None:
+    seen = limited_drive(math.inf)
+    rec = seen.with_channels(velocity=seen.velocity + 0.03 * np.random.default_rng(3).standard_normal(len(seen)))
+    highest = float(np.abs(rec.torque).max())
+    far, reached = (ga.PI(CONTROLLER.kp, CONTROLLER.ki, torque_limit=share * highest) for share in (2.0, 1.0))
+    assert replay(rec, far).velocity_noise == pytest.approx(0.03, rel=0.05)
+    assert replay(rec, reached).velocity_noise == 0.0
+
+
 def test_a_filter_of_the_controller_is_no_noise_of_the_log() -> None:
     seen = limited_drive(math.inf)
     filtered = ga.Cascade(CONTROLLER, velocity_filters=(ga.LowPass(2e-3),))

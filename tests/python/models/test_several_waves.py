@@ -209,3 +209,23 @@ def test_a_fleet_has_a_course_of_each_order(diagnosed_axis: ga.Diagnosis) -> Non
         **{(4, "amplitude"): 0.03, (4, "order"): 4.0, (4, "phase"): 0.3},
         **{(12, "amplitude"): 0.02, (12, "order"): 12.0, (12, "phase"): 1.0},
     }
+
+
+@pytest.mark.parametrize("order", [np.array([4, 4]), np.array([4.0, 4.0], dtype=np.float32), [4, 4], [np.int64(4), 4.0]])
+def test_equal_orders_of_any_number_type_are_refused(order: Any) -> None:
+    with pytest.raises(ModelError, match="give one wave of each order"):
+        MODELS["one mass"][1].with_effect("cogging", amplitude=[0.1, 0.2], order=order, phase=[0.0, 0.0])
+
+
+def test_an_order_that_is_no_number_is_refused_as_any_parameter() -> None:
+    model = MODELS["one mass"][1]
+    for order, others in ((np.nan, 0.1), ([4.0, np.nan], [0.1, 0.1])):
+        with pytest.raises(ModelError, match="is nan: give one finite number"):
+            model.with_effect("cogging", amplitude=others, order=order, phase=others)
+    with pytest.raises(ModelError, match="its keys are amplitude, order, phase"):
+        model.with_effect("cogging", **{"amplitude": 0.1, "order": 4.0, "phase": 0.0, "amplitude_\u00b2": 0.1})
+
+
+def test_an_array_without_a_dimension_is_a_number() -> None:
+    (effect,) = MODELS["one mass"][1].with_effect("cogging", amplitude=np.array(0.1), order=np.array(4), phase=0.0).effects
+    assert effect.parameters == {"amplitude": 0.1, "order": 4.0, "phase": 0.0}

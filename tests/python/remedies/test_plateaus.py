@@ -277,3 +277,13 @@ def test_a_log_slower_than_its_loop_gives_the_friction_within_its_deviations() -
         off += [(e.value - (truth | {"viscous": plant.D})[name]) / e.std for name, e in numbers]
         assert all(e.std < 0.25 * e.value for _, e in numbers)
     assert np.max(np.abs(off)) < 4.0 and np.sqrt(np.mean(np.square(off))) < 2.0
+
+
+def test_a_number_at_its_bound_is_judged_there() -> None:
+    """Of a fall from rest at no speed the torque jumps, however near the bound the solver ends."""
+    speeds = np.array([2.0, 5.0, 10.0, 20.0, -2.0, -5.0, -10.0, -20.0])
+    noise = np.random.default_rng(0).standard_normal((60, 8))[43]
+    torque = 0.02 * speeds + 0.3 * np.sign(speeds) + 1e-3 * noise
+    found = laws_of([Plateau("a", 0, 1, float(v), float(u), 1e-3, 50.0, 50) for v, u in zip(speeds, torque, strict=True)])
+    assert "coulomb_friction" in found.laws[0].effects and found.beyond < 2e-3
+    assert found.laws[0].effects["coulomb_friction"]["torque"].value == pytest.approx(0.3, abs=4e-3)
