@@ -34,6 +34,7 @@ Vector = NDArray[np.float64]
 Matrix = NDArray[np.float64]
 
 ROUNDED = 1e-12  # no decision: exact to; of a variance, the least noise that is added
+LARGER = 10.0  # no decision: of a solver: the next noise that is tried, times the last
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,4 +105,4 @@ def _factor_of(band: Matrix) -> Matrix:
         except np.linalg.LinAlgError:
             if not more < 1.0 or not np.all(np.isfinite(band)):
                 raise
-            more = max(10.0 * more, ROUNDED)
+            more = max(LARGER * more, ROUNDED)
