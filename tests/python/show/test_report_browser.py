@@ -73,7 +73,7 @@ def test_it_draws_zooms_and_downloads_without_errors_and_without_a_network(
         figures + ".map(f => { const g = f.querySelector('.live'); return [f.classList.contains('drawn'), g.clientWidth, "
         "g._fullData.filter(t => t.y.length > 1).length, g.querySelectorAll('path').length]; })"
     )
-    assert len(drawn) == 13 and all(ok and width > 900 and data > 0 and paths > 2 for ok, width, data, paths in drawn), drawn
+    assert len(drawn) == 14 and all(ok and width > 900 and data > 0 and paths > 2 for ok, width, data, paths in drawn), drawn
     assert not any(browser.run(figures + ".map(f => f.querySelector('.still').offsetHeight)"))
 
     # A drag over the first chart narrows it and the missing torque further down, and nothing else.
@@ -135,4 +135,4 @@ def test_without_scripts_the_pictures_are_there(browser: Browser, page: Path) ->
     browser.open(page)
     shown = browser.run("[...document.querySelectorAll('figure')].map(f => f.querySelector('.still').offsetHeight)")
     browser.ask("Emulation.setScriptExecutionDisabled", value=False)
-    assert len(shown) == 13 and min(shown) > 50
+    assert len(shown) == 14 and min(shown) > 50
