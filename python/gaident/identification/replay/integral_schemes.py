@@ -216,8 +216,8 @@ def _shown(records: Sequence[Record], controller: Cascade) -> SchemeShown | None
     if at_rate:
         scheme, std = _as_the_log_tells(records, whole, scheme, bare, std)
     left = _rms(_left(logs, scheme, bare))
-    made_of = _exact if at_rate else _follows
-    follows = closer or all(made_of(rec, log, scheme, bare) for rec, log in zip(records, whole, strict=True))
+    of_one = _exact if at_rate else _follows
+    follows = closer or all(of_one(rec, log, scheme, bare) for rec, log in zip(records, whole, strict=True))
     decays = not closer or 1.0 - scheme.number > POLICY.check_deviations * std
     part = float(np.sqrt(POLICY.replay_left)) if at_rate else POLICY.each_number
     if not (follows and decays and left < part * before):
@@ -236,6 +236,7 @@ def _exact(rec: Record, log: Log, scheme: Scheme, controller: Cascade) -> bool:
 
 
 def _follows_exactly(rec: Record, log: Log, made: Vector, controller: Cascade) -> bool:
+    """The same of any torque (n,) [N m]; controller: whose gains and limits say what rounding makes."""
     pi, off = controller.velocity, log.torque - made
     measured = rec.torque_is == MEASURED and white_noise(off, log.torque) > 0.0
     return measured or any(one(off, pi.limits) for one in _allowed(rec, log, pi))
