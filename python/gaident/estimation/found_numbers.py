@@ -89,7 +89,7 @@ def _made(rec: Record, controller: Controller) -> Vector:
     if made is None:
         pi = bare_pi(controller)
         made = torque_of(rec, pi) if pi is not None else torque_in(driven_by(rec, controller))
-        made.flags.writeable = False
+        made.setflags(write=False)
     kept[controller] = made  # the last one that was asked for
     while len(kept) > KEPT:
         kept.pop(next(iter(kept), controller), None)

@@ -426,6 +426,24 @@ def test_of_one_family_dry_friction_has_the_name_before_what_has_no_level(monkey
     assert better(bench.fit(A), level, 0.3) is None, "another family"
 
 
+def test_dry_friction_is_tried_at_the_size_of_a_constant_torque_that_it_cannot_be_told_from(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """From its own start it may stand still, where no slope shows the way: but its size is that of the torque, which is known."""
+    monkeypatch.setitem(SHAPES, "level", lambda z: wave(10.5) * (z[0] if z[0] > 0.6 else 0.0))
+    constant = toy("constant", [(0.5,)], constant=True)
+    monkeypatch.setitem(SHAPES, "constant", lambda z: -z[0] * wave(10.5))
+    monkeypatch.setattr(rivals, "LIBRARY", {**LIBRARY, "constant": constant})
+    bench = Bench({"level": (0.9,)}, allowed=(*TERMS, constant))
+    found = bench.fit(constant)
+    assert found.x[-1] == pytest.approx(-0.9, abs=0.02)
+    assert bench.fit(LEVEL).bic > found.bic + 100.0, "from its start"
+    assert "level" not in [r.effect for r in rivals_of(bench.space, found, "constant")[1]], "where records tell them apart"
+    alike = {r.effect: r for r in rivals_of(bench.space, found, "constant", ["level"])[1]}
+    assert alike["level"].behind == pytest.approx(0.0, abs=1e-6) and alike["level"].fit.x[-1] == pytest.approx(0.9, abs=0.02)
+    assert rivals.of_each_effect(bench.space, found, True, lambda name: ["level"], lambda message: None)[1] is not None
+
+
 def test_a_rival_that_loses_its_effect_and_is_worse_takes_no_place(monkeypatch: pytest.MonkeyPatch) -> None:
     """Reduced, it is a model without the effect: it stays an alternative, and the model keeps its name."""
     bench = Bench({"a": (0.5,)})

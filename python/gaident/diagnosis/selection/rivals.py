@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass
+
+import numpy as np
 
 from gaident.diagnosis.library.terms import LIBRARY
 from gaident.diagnosis.selection.model_space import representative, words
@@ -87,6 +89,7 @@ def rivals_of(space: Moves, final: Fit, effect: str, equivalent: Collection[str]
     others = [f for f in space.extended(less) if _only_new(f, final) not in ("", elsewhere)]
     grown = {_only_new(f, final) for f in others}
     others += [f for f in space.as_other_wave(final, term) if _only_new(f, final) not in grown]
+    others = _least_of_each(final, [*others, *_as_dry_friction(space, final, term, equivalent)])
     missed = term.impacts and _missed(space, final, less)
     if missed:  # a candidate may be the model with another mechanism and no effect
         others = [f for f in others if not f.parameters.term(_only_new(f, final)).impacts]
@@ -118,6 +121,31 @@ def rivals_of(space: Moves, final: Fit, effect: str, equivalent: Collection[str]
         there = Replacement(elsewhere, turned.bic - final.bic, turned)
         found.insert(0 if not found or there.behind < found[0].behind else len(found), there)
     return float(gain), found
+
+
+def _as_dry_friction(space: Moves, final: Fit, term: Term, equivalent: Collection[str]) -> list[Fit]:
+    """The model with dry friction of the size of a constant torque in its place, where these records cannot tell them apart.
+
+    In one direction both are the same torque.
+    A fit of dry friction from other levels may end with an axis that sticks where the measured one moves.
+    """
+    dry = [LIBRARY[name] for name in sorted(equivalent) if LIBRARY[name].levels and LIBRARY[name].simplest]
+    if not dry or not LIBRARY[term.name].constant:
+        return []
+    size = np.abs(final.x[final.parameters.slot(term.name)])
+    short, x = final.hypothesis.without(term.name), final.parameters.removed(final.x, term.name)
+    may = [other for other in dry if other in space.allowed and other.name not in final.effects]
+    return [space.continued(short.extended(other), final, short.parameters.inserted(x, size)) for other in may]
+
+
+def _least_of_each(final: Fit, others: Sequence[Fit]) -> list[Fit]:
+    """Of the fits with the same new effect the one of least BIC."""
+    least: dict[str, Fit] = {}
+    for f in others:
+        name = _only_new(f, final)
+        if name not in least or f.bic < least[name].bic:
+            least[name] = f
+    return list(least.values())
 
 
 def _beside_simpler(space: Moves, final: Fit, term: Term) -> list[Replacement]:

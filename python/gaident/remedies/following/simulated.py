@@ -99,7 +99,7 @@ def _figures(error: Vector, torque: Vector | None) -> LoopError:
 
 
 @dataclass(frozen=True, eq=False)
-class _Run:
+class _Motion:
     velocity: Vector
     torque: Vector
     angle: Vector
@@ -142,16 +142,16 @@ class _Loop:
         turned = self.start + self.period * np.append(0.0, np.cumsum(self.command)[:-1])
         return self.command, ticks.torque_feedforward, turned
 
-    def run(self, cascade: Cascade, added: Vector | None) -> _Run:
+    def run(self, cascade: Cascade, added: Vector | None) -> _Motion:
         """From rest, with a torque added at each of the controller's samples [N m]."""
         none = np.zeros(len(self.command))
         loaded = core.effect_record(self.period, self.command, None, none, self.start, cascade, added=added)
         found = simulated_with_effects(loaded, [self.model], np.zeros((0, 0)), 0, 1, True)
         if not all(np.all(np.isfinite(signal)) for signal in found):
             raise GaidentError(RUNS_AWAY)
-        return _Run(*(signal[0] for signal in found))
+        return _Motion(*(signal[0] for signal in found))
 
-    def run_with(self, cascade: Cascade, tables: FeedforwardTables) -> _Run:
+    def run_with(self, cascade: Cascade, tables: FeedforwardTables) -> _Motion:
         """With the tables' torque; that by angle is looked up at the angle of the run itself."""
         velocity, acceleration, angle = self.motion()
         size = sum(float(np.hypot(wave.sine, wave.cosine)) for wave in tables.waves)
@@ -166,9 +166,9 @@ class _Loop:
             added = looked_up
         raise GaidentError(UNSETTLED)
 
-    def error(self, run: _Run) -> Vector:
+    def error(self, run: _Motion) -> Vector:
         """Command minus motion at the lines of the log."""
         return (self.command - (run.angle if self.placed else run.velocity))[:: self.every]
 
-    def figures(self, run: _Run) -> LoopError:
+    def figures(self, run: _Motion) -> LoopError:
         return _figures(self.error(run), run.torque)

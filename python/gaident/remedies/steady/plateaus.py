@@ -164,7 +164,7 @@ def _slope(w: Vector, dt: float) -> tuple[float, float]:
     return slope, float(np.sqrt(np.mean(left**2) * len(w) / effective_samples(left) / (t @ t)))
 
 
-class _Part(NamedTuple):
+class _Stretch(NamedTuple):
     """A stretch in the band; turns: it fills the band as a turning point does."""
 
     start: int
@@ -172,7 +172,7 @@ class _Part(NamedTuple):
     turns: bool = False
 
 
-def _joined(parts: Sequence[_Part], velocity: Vector, smooth: Vector) -> list[_Part]:
+def _joined(parts: Sequence[_Stretch], velocity: Vector, smooth: Vector) -> list[_Stretch]:
     """Stretches in their order, neighbours of one speed as one: all of them, else those before and after a cut.
 
     The cut is at the widest gap, of the lengths beside it, or where neighbours differ most.
@@ -183,13 +183,13 @@ def _joined(parts: Sequence[_Part], velocity: Vector, smooth: Vector) -> list[_P
     gaps = [_gap(before, after, smooth) for before, after in itertools.pairwise(parts)]
     one_way = np.ptp(np.sign(smooth[whole])) == 0.0
     if max(gaps) < 1.0 and one_way and _of_one_speed(parts, velocity, float(np.mean(velocity[whole]))):
-        return [_Part(whole.start, whole.stop)]
+        return [_Stretch(whole.start, whole.stop)]
     means = [float(np.mean(velocity[part.start : part.stop])) for part in parts]
     at = 1 + int(np.argmax(gaps if max(gaps) >= 1.0 else np.abs(np.diff(means))))
     return [*_joined(parts[:at], velocity, smooth), *_joined(parts[at:], velocity, smooth)]
 
 
-def _gap(before: _Part, after: _Part, smooth: Vector) -> float:
+def _gap(before: _Stretch, after: _Stretch, smooth: Vector) -> float:
     """Length of the gap between two stretches, of the longer one; 0 where the speed in it is near theirs."""
     speed, between = float(np.mean(smooth[before.start : after.stop])), smooth[before.stop : after.start]
     if np.all(np.abs(between - speed) < SIDES * POLICY.apart * abs(speed)):
@@ -197,16 +197,16 @@ def _gap(before: _Part, after: _Part, smooth: Vector) -> float:
     return (after.start - before.stop) / max(before.stop - before.start, after.stop - after.start)
 
 
-def _of_one_speed(parts: Sequence[_Part], velocity: Vector, speed: float) -> bool:
+def _of_one_speed(parts: Sequence[_Stretch], velocity: Vector, speed: float) -> bool:
     """Whether each has the speed of all."""
     own = [velocity[part.start : part.stop] for part in parts]
     reach = POLICY.apart * abs(speed)
     return all(abs(np.mean(w) - speed) < max(reach, POLICY.standing_noise * np.std(w) / np.sqrt(len(w))) for w in own)
 
 
-def _stretches(smooth: Vector, scatter: float) -> list[_Part]:
+def _stretches(smooth: Vector, scatter: float) -> list[_Stretch]:
     """The stretches that keep to (1), are no ramp and long enough, in their order."""
-    found: list[_Part] = []
+    found: list[_Stretch] = []
     for share in (POLICY.still, POLICY.apart):
         ends = [0, *(end for part in sorted(found) for end in (part.start, part.stop)), len(smooth)]
         found += _longest(smooth, list(zip(ends[::2], ends[1::2], strict=True)), _Width(share, scatter))
@@ -223,7 +223,7 @@ class _Width(NamedTuple):
         return max(SIDES * self.share * abs(speed), POLICY.above_noise * self.scatter)
 
 
-def _longest(smooth: Vector, parts: list[tuple[int, int]], width: _Width) -> Iterator[_Part]:
+def _longest(smooth: Vector, parts: list[tuple[int, int]], width: _Width) -> Iterator[_Stretch]:
     """Of each part the longest stretch in the band, and of what is left on either side; those of a ramp left out."""
     reach = _reach(smooth, width)
     while parts:
@@ -239,7 +239,7 @@ def _longest(smooth: Vector, parts: list[tuple[int, int]], width: _Width) -> Ite
         first, second, third, last = np.array_split(smooth[start:stop], 4)
         little = POLICY.no_ramp * width.at(float(np.median(smooth[start:stop])))
         if _differ([first, second], [third, last]) < little:
-            yield _Part(start, stop, _differ([first, last], [second, third]) >= little)
+            yield _Stretch(start, stop, _differ([first, last], [second, third]) >= little)
 
 
 def _differ(some: list[Vector], others: list[Vector]) -> float:
