@@ -68,6 +68,40 @@ def test_a_filter_is_found_beside_friction() -> None:
 
 
 @pytest.mark.long
+@pytest.mark.parametrize(
+    ("controller", "form", "number", "effect"),
+    [
+        (
+            ga.Cascade(ga.PI(KP, KI, command_weight=0.25)),
+            "command_weight",
+            0.25,
+            ("unbalance", {"amplitude": 0.02, "phase": 0.3}),
+        ),
+        (
+            ga.Cascade(PI, velocity_filters=(ga.LowPass(2.5e-3),)),
+            "velocity_feedback_filter",
+            2.5e-3,
+            ("cogging", {"amplitude": 0.012, "order": 6.0, "phase": 0.3}),
+        ),
+    ],
+)
+def test_a_form_is_found_beside_a_torque_over_the_angle(
+    controller: ga.Cascade, form: str, number: float, effect: tuple[str, dict[str, float]]
+) -> None:
+    """The search under the given PI finds another torque over the angle, or none: with the form it is another one."""
+    name, values = effect
+    levels = np.repeat([0, 20.0, -35, 10, -10, 50, -50, 25, -5, 5, -20, 40, -30, 15, -15, 0], 90)
+    log = rig(Plant(J, D, KP, KI, DT, cascade=controller), levels, {name: values}, Noise(white=0.03), seed=3, torque_logged=False)
+    dia = ga.diagnose(log, PI)
+    assert dia.verdict == "explained" and {f.effect for f in dia.causes} == {form, name}, dia.summary()
+    found = {f.effect: f.parameters for f in dia.causes}
+    (estimate,) = found[form].values()
+    assert abs(estimate.value - number) < 4.0 * estimate.std < 0.1 * number
+    assert found[name]["amplitude"].value == pytest.approx(values["amplitude"], rel=0.05)
+    assert dia.mechanics["inertia"].value == pytest.approx(J, rel=5e-3)
+
+
+@pytest.mark.long
 def test_an_ip_controller_is_found_although_it_looks_like_a_lag_and_more_damping() -> None:
     """On one mass an IP loop is to its command what a PI loop with a lag of kp/ki on a more damped mass is."""
     dia = ga.diagnose(record(ga.Cascade(ga.PI(KP, KI, command_weight=0.0))), PI)

@@ -13,6 +13,7 @@ import numpy as np
 
 from gaident.diagnosis.selection.mechanisms import balanced, is_mechanism, on_a_shaft, reduced, rigid
 from gaident.diagnosis.selection.model_space import ModelSpace
+from gaident.diagnosis.selection.screening.score_test import ScoreTest
 from gaident.errors import GaidentError
 from gaident.estimation import least_squares as ls
 from gaident.estimation.dataset import DataSet
@@ -27,7 +28,7 @@ from gaident.identification.identify import identify
 from gaident.models.model import Model
 from gaident.policy.table import POLICY
 
-__all__ = ["dry_friction", "mechanisms_under", "with_term", "with_usual_effects"]
+__all__ = ["dry_friction", "mechanisms_under", "with_term", "with_usual_effects", "with_wave"]
 
 POLES = (1, 1)  # no decision: a formula: of two masses, p
 ZEROS = (2, 3)  # no decision: a formula: of two masses, q, and one pole and zero more
@@ -92,6 +93,16 @@ def with_usual_effects(space: ModelSpace, objective: Objective, fit: Fit) -> Fit
     for terms in (dry_friction(space, fit), late):
         fit = min((fit, *(with_term(objective, fit, term) for term in terms)), key=space.score)
     return fit
+
+
+def with_wave(space: ModelSpace, objective: Objective, fit: Fit) -> list[Fit]:
+    """[the fit with the torque over the angle that promises most, cogging or an unbalance]; [] where none promises anything."""
+    there = {*fit.effects}.union(*(t.excludes for t in fit.parameters.terms))
+    waves = [t for t in space.allowed if t.harmonic == "torque" and not t.at_load and t.name not in there]
+    test = ScoreTest(objective)
+    test.add(fit.hypothesis, fit.x, waves)
+    best = [s for s in test.ranked(WHITE) if s.fall > 0.0][:1]
+    return [ls.scored(objective, ls.fit(objective, s.hypothesis, s.starts[0], WHITE, POLICY.short)) for s in best]
 
 
 def with_term(objective: Objective, fit: Fit, term: Term) -> Fit:

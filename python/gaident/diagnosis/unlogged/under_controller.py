@@ -21,10 +21,10 @@ from gaident.control.found import NUMBER_STEP, FoundNumbers
 from gaident.diagnosis.selection.model_space import ModelSpace
 from gaident.estimation import least_squares as ls
 from gaident.estimation.dataset import DataSet
-from gaident.estimation.found_numbers import numbers_in, refined, slopes
+from gaident.estimation.found_numbers import covariance_of_numbers, numbers_in, refined, slopes
 from gaident.estimation.noise_model import WHITE, NoiseFilter
 from gaident.estimation.objective import Fit, Hypothesis, Objective
-from gaident.estimation.projection import WORST, inverse_of, project_out
+from gaident.estimation.projection import WORST, project_out
 from gaident.policy.table import POLICY
 
 __all__ = ["UnderController", "out_of_reach"]
@@ -80,10 +80,8 @@ class UnderController:
 
     def deviations(self, objective: Objective, fit: Fit, z: Vector) -> Vector:
         """Standard deviations of z (k,) at a fit."""
-        v, C = self.slopes(objective, fit.hypothesis, fit.x, fit.noise, z)
-        variance = float(v @ v) / objective.information
-        spread = inverse_of(C @ C.T * objective.information / max(objective.count, 1.0)) * variance
-        return np.asarray(np.sqrt(np.maximum(np.diag(spread), 0.0)))
+        there = replace(fit, hypothesis=self.of(fit.hypothesis, z))
+        return np.asarray(np.sqrt(np.maximum(np.diag(covariance_of_numbers(objective, there)), 0.0)))
 
 
 def out_of_reach(space: ModelSpace, selected: Fit) -> float:

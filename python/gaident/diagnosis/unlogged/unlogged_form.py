@@ -27,7 +27,7 @@ from gaident.control.cascade import Cascade
 from gaident.control.found import NUMBER_STEP, FoundNumbers
 from gaident.control.pi import PI
 from gaident.diagnosis.selection.moves import Moves
-from gaident.diagnosis.unlogged.anew import dry_friction, mechanisms_under, with_term, with_usual_effects
+from gaident.diagnosis.unlogged.anew import dry_friction, mechanisms_under, with_term, with_usual_effects, with_wave
 from gaident.diagnosis.unlogged.controller_forms import VARIANTS, ControllerForm
 from gaident.diagnosis.unlogged.other_gains import OTHER_GAINS
 from gaident.diagnosis.unlogged.under_controller import UnderController, out_of_reach
@@ -95,7 +95,9 @@ def unlogged_form(space: Moves, final: Fit, doubtful: bool = False) -> UnloggedF
     bases = [_without(space, final, series)]
     if not settled:
         bases += [final] * bool(series) + [_without(space, final, final.effects)] * (set(final.effects) > set(series))
-    starts = _promising(space, objective, data.pi, [_opened(space, base) for base in bases])
+    # Driven by the torque alone, what turns with the angle is off with it: what the selected model is led by counts too.
+    bases = [*(_opened(space, base) for base in bases), *(base for base in bases if base.predictor.closed)]
+    starts = _promising(space, objective, data.pi, bases)
     if not settled:
         starts += [
             (v, under, with_term(objective, base, friction), z)
@@ -223,16 +225,17 @@ def _begun(space: Moves, objective: Objective, starts: Sequence[_Start]) -> list
 
 
 def _once_more(space: Moves, objective: Objective, pi: PI, ends: Sequence[_End]) -> list[_Start]:
-    """The best end of each form, where its model is better with one of the usual effects that it has not.
+    """The best end of each form with usual effects that make it better, and with the torque over the angle that promises most.
 
-    Wrong numbers of a form hide them.
+    Wrong numbers of a form hide them: that torque may only be worth it with other numbers.
     """
     starts: list[_Start] = []
     for form in VARIANTS:
         best = min((end for end in ends if end[2] is form), key=lambda end: end[1], default=None)
         if best is not None:
-            fit, numbers = with_usual_effects(space, objective, best[0]), best[3]
-            starts += [(form, _under(space, pi, form), fit, numbers.at)] * (len(fit.effects) > len(best[0].effects))
+            fit, under, z = with_usual_effects(space, objective, best[0]), _under(space, pi, form), best[3].at
+            starts += [(form, under, fit, z)] * (len(fit.effects) > len(best[0].effects))
+            starts += [(form, under, waved, z) for waved in with_wave(space, objective, fit)]
     return starts
 
 
