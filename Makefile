@@ -94,12 +94,16 @@ real: .venv/.tested ## measured drives diagnosed and fitted (GAIDENT_DATA); fail
 	$(BIN)/python bench/real.py --check --workers $(JOBS) --out build/real.jsonl $(REAL_FLAGS)
 
 # From the objects of `test`: what stands in pyproject.toml for a build is in .venv already, and nothing else is.
-bare: .venv/.tested ## the package in an empty environment, with what it installs itself
+bare: .venv/.tested ## the package in an empty environment, with what it installs itself, and with the oldest versions that it allows
 	@rm -rf build/bare
 	$(BIN)/python -m pip wheel --quiet --no-deps $(CHECKED) --wheel-dir build/bare .
 	$(PYTHON) -m venv build/bare/env
 	build/bare/env/bin/python -m pip install --quiet build/bare/*.whl
 	cd build/bare && env/bin/gaident --help > help.txt && env/bin/gaident doctor
+	$(call listed,dependencies) | sed -n '/;/!s/>=/==/p' > build/bare/oldest.txt
+	build/bare/env/bin/python -m pip install --quiet --only-binary :all: -r build/bare/oldest.txt pytest hypothesis "mpmath==1.3.*"
+	cd build/bare && env/bin/gaident doctor && env/bin/gaident demo --quiet --out demo
+	env -u GAIDENT_DATA build/bare/env/bin/python -m pytest -q -p no:cacheprovider -m "not long" $(WHEEL_TESTS)
 
 embedded: ## the search in a drive, on two emulated Cortex-M boards, and the recurrences on ARM64, compared bit for bit (docs/dsp.md)
 	@csrc/embedded/tools.sh

@@ -157,7 +157,8 @@ class Work:
         again = self.driving.regained_from is not None
         self.gain_doubt = gain_doubt(self.found.space, self.final, again)
         self.doubtful = self.gain_doubt.better is not None or of_no_axis(mechanics_of(self.under, self.estimate)) is not None
-        self.form = None if again or self.form_refused else unlogged_form(self.found.space, self.final, self.doubtful)
+        asked = not (again or self.form_refused)
+        self.form = unlogged_form(self.found.space, self.final, self.gain_doubt.better, self.doubtful) if asked else None
 
     def with_joint_numbers(self) -> None:
         """The numbers of the controller that its torque showed, where the model of the axis shows them closer."""
@@ -178,9 +179,7 @@ class Work:
 
     def other_form(self) -> UnloggedForm | None:
         """A form of controller that explains these records better than the given one and than other gains, or None."""
-        form, gains, margin = self.form, self.gain_doubt.better, self.found.space.margin
-        better = form is not None and form.better(margin) and (gains is None or form.score < gains.score - margin)
-        return form if better else None
+        return self.form if self.form is not None and self.form.better(self.found.space.margin) else None
 
     def confirms(self, given: Work) -> bool:
         """Whether a search under another form of controller leaves noise, and fewer effects, less or a better mechanism."""
@@ -189,7 +188,6 @@ class Work:
 
     @property
     def leaves_noise(self) -> bool:
-        """Whether the model leaves noise."""
         return leaves_noise(self.found.space, self.final)
 
     def refused(self, form: UnloggedForm) -> None:
@@ -202,7 +200,9 @@ class Work:
 
         first: the work under the given gains, where this work is under other gains already; the gain is counted from its model.
         """
-        better = self.gain_doubt.better
+        better, given = self.gain_doubt.better, first or self
+        if better is not None and given.form is not None:
+            better = replace(better, rivals=given.form.rivals_of_gains(given.found.space.margin))
         if better is None or first is None or first is self:
             return better
         same = first.found.space.whitens == self.found.space.whitens  # else the two are no BIC of the same errors

@@ -7,9 +7,12 @@ import pytest
 
 import gaident as ga
 from drive_rig import Noise, Plant, rig, skip_without_library
+from gaident.axis import say
 from gaident.diagnosis.explain.wording import like_filters, or_other_form
 from gaident.diagnosis.unlogged.controller_forms import VARIANTS
+from gaident.diagnosis.unlogged.other_gains import OtherGains
 from gaident.estimation.dataset import DataSet
+from gaident.results.estimate import Estimate
 
 DT = 1e-3
 KP, KI = 0.05, 1.5
@@ -102,6 +105,26 @@ def test_a_form_is_found_beside_a_torque_over_the_angle(
 
 
 @pytest.mark.long
+def test_forms_and_other_gains_are_compared_under_the_same_predictors() -> None:
+    """Led in the loop other gains leave less than a command weight driven by the torque; with them the inertia is 26 % off."""
+    pi, weight = ga.PI(0.04078, 0.9371), 0.776
+    total, ratio, resonance = 2.4459e-4, 0.435, 2.0 * np.pi * 134.6
+    motor = total / (1.0 + ratio)
+    load = total - motor
+    stiffness = resonance**2 * motor * load / total
+    damping = 0.04 * resonance * motor * load / total
+    cascade = ga.Cascade(ga.PI(pi.kp, pi.ki, command_weight=weight))
+    plant = Plant(motor, 2e-3, pi.kp, pi.ki, DT, load, 4e-4, stiffness, damping, cascade=cascade)
+    levels = np.repeat([0, 20.0, -35, 10, -10, 50, -50, 25, -5, 5, -20, 40, -30, 15, -15, 0], 90)
+    log = rig(plant, levels, {"coulomb_friction": {"torque": 0.05}}, Noise(white=0.03), seed=56, torque_logged=False)
+    dia = ga.diagnose(log, pi)
+    assert {f.effect for f in dia.causes} == {"command_weight", "coulomb_friction"}, dia.summary()
+    (found,) = [f.parameters["weight"] for f in dia.causes if f.place == "controller"]
+    assert abs(found.value - weight) < 3.0 * found.std < 0.01
+    assert dia.mechanics["inertia"].value == pytest.approx(total, rel=5e-3)
+
+
+@pytest.mark.long
 def test_an_ip_controller_is_found_although_it_looks_like_a_lag_and_more_damping() -> None:
     """On one mass an IP loop is to its command what a PI loop with a lag of kp/ki on a more damped mass is."""
     dia = ga.diagnose(record(ga.Cascade(ga.PI(KP, KI, command_weight=0.0))), PI)
@@ -144,6 +167,15 @@ def test_a_filter_of_the_command_is_found_where_other_two_masses_leave_noise_und
     assert (dia.verdict, found.effect) == ("explained", "command_filter"), dia.summary()
     assert found.parameters["time_constant"].value == pytest.approx(lag.time_constant, rel=0.01)
     assert dia.mechanics["inertia"].value == pytest.approx(plant.J + plant.JL, rel=5e-3)
+
+
+def test_what_explains_as_much_as_other_gains_is_their_alternative_with_the_inertia_that_comes_with_it() -> None:
+    ki = Estimate(1.2, 0.01, "N m/rad")
+    beside = {"command_weight": say("a command weight (weight {:.4g}), with an inertia of {:.4g} {kg m^2}", 0.8, 2e-4)}
+    found = OtherGains(None, PI, {"ki": ki}, 0.0, 0.0, 90.0, None, beside).finding(PI)  # type: ignore[arg-type]
+    assert found.effect == "other_gains" and found.alternatives == ("command_weight",)
+    said = "So it does with the given gains and a command weight (weight 0.8), with an inertia of 0.0002 kg m^2. Log the torque"
+    assert said in found.evidence
 
 
 def test_what_comes_closer_is_no_other_part_of_a_controller_that_has_none() -> None:

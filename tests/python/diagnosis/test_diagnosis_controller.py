@@ -16,6 +16,7 @@ from gaident.control.pi_torque import held_torque
 from gaident.diagnosis.controller.as_read import outliers_of_the_log
 from gaident.diagnosis.controller.form_findings import driver_of, loop_of
 from gaident.diagnosis.records.hygiene import outliers
+from gaident.identification.replay.causes import follows_past
 from gaident.identification.replay.replay import Replay, replay
 from gaident.models.starts import noise_std
 
@@ -63,6 +64,31 @@ def test_a_velocity_that_the_log_alone_has_noise_on_asks_for_no_form_of_controll
     found = loop_of([rec], CONTROLLER)
     assert found.controller == CONTROLLER and found.at_rate and not found.findings
     assert driver_of([rec], [], CONTROLLER) is None
+
+
+def test_a_filter_of_the_torque_is_no_shift_with_other_gains() -> None:
+    """Under rare steps what a shift by one sample leaves of a low pass passes for white: large errors that are few."""
+    period, pi = 1.25e-4, ga.PI(0.0232, 1.367)
+    command = np.repeat(np.random.default_rng(0).uniform(-80.0, 80.0, 8), 1000)
+    filtered = ga.Cascade(pi, period=period, torque_filters=(ga.LowPass(2.7e-4),))
+    two = ga.TwoMass(JM=8.7e-5, DM=3.5e-3, JL=5e-4, DL=9e-3, KG=3.1).model()
+    run = ga.run(two, ga.Record(period, command=command, velocity=0.0 * command), filtered)
+    rec = ga.Record(period, command=command, velocity=run.velocity, torque=run.torque)
+    told = replay(rec, pi)
+    assert told.follows is False and not told.cause
+    assert replay(rec, filtered).follows
+
+
+def test_a_noise_of_the_torque_does_not_follow_past_errors_and_what_a_late_torque_leaves_does() -> None:
+    rng, false = np.random.default_rng(1), 0
+    for _ in range(50):
+        error = np.repeat(rng.standard_normal(10), 100) + 0.1 * rng.standard_normal(1000)
+        torque = 0.05 * rng.standard_normal(1000)
+        false += follows_past(torque, error)
+    assert false == 0
+    late = np.concatenate([[0.0], error[:-1]])
+    assert follows_past(torque + 0.05 * (error - late), error)
+    assert not follows_past(torque + 0.05 * error, error), "another gain"
 
 
 def test_a_limit_that_is_not_reached_hides_no_noise_of_the_log() -> None:

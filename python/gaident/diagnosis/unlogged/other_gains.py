@@ -18,6 +18,7 @@ effect costs. What comes out is compared with the selected model by the criterio
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
@@ -52,7 +53,7 @@ class OtherGains:
     """A model under other gains: its fit, the PI, and how well its gains are known.
 
     gain: BIC units by which the selected model, under the given gains, is worse.
-    found: the gains' logarithms over the given ones.
+    found: the gains' logarithms over the given ones. rivals: findings of forms of controller that explain as much, and how.
     """
 
     fit: Fit
@@ -62,6 +63,7 @@ class OtherGains:
     bic: float
     gain: float
     found: FoundNumbers
+    rivals: Mapping[str, Text] = field(default_factory=dict)
 
     def moves(self, pi: PI) -> bool:
         """Whether a gain differs from that of a PI by more than its deviation."""
@@ -71,14 +73,15 @@ class OtherGains:
         """What is reported of these gains in the place of the given ones."""
         text = (
             "No {torque} is logged; with {} instead of the given {} command and velocity agree with the axis{}. "
-            "{}Log the {torque}, which shows both gains."
+            "{}{}Log the {torque}, which shows both gains."
         )
         shown = joined(" and ", (say("{} = {:.4g} {}", name, e.value, unit_text(e.unit)) for name, e in self.estimates.items()))
         was = joined(" and ", (say("{:.4g}", getattr(given, name)) for name in self.estimates))
         more = Text("" if len(self.estimates) > 1 else "Only the ratio ki/kp shows, kp is taken as given. ")
         worse = say(", and the best model under the given gains is {:.0f} BIC units worse", self.gain) if self.gain > 0.0 else ""
-        return Finding(OTHER_GAINS, self.estimates, (), 0.0, self.gain, None, say(text, shown, was, worse, more),
-                       place="controller")  # fmt: skip
+        instead = say("So it does with the given gains and {}. ", joined(" or ", self.rivals.values())) if self.rivals else ""
+        return Finding(OTHER_GAINS, self.estimates, tuple(self.rivals), 0.0, self.gain, None,
+                       say(text, shown, was, worse, more, instead), place="controller")  # fmt: skip
 
 
 @dataclass(frozen=True)

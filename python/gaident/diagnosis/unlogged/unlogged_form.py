@@ -26,10 +26,11 @@ from gaident.axis import Text, joined, say, unit_text
 from gaident.control.cascade import Cascade
 from gaident.control.found import NUMBER_STEP, FoundNumbers
 from gaident.control.pi import PI
+from gaident.diagnosis.mechanics import moved
 from gaident.diagnosis.selection.moves import Moves
 from gaident.diagnosis.unlogged.anew import dry_friction, mechanisms_under, with_term, with_usual_effects, with_wave
 from gaident.diagnosis.unlogged.controller_forms import VARIANTS, ControllerForm
-from gaident.diagnosis.unlogged.other_gains import OTHER_GAINS
+from gaident.diagnosis.unlogged.other_gains import OTHER_GAINS, OtherGains
 from gaident.diagnosis.unlogged.under_controller import UnderController, out_of_reach
 from gaident.estimation import least_squares as ls
 from gaident.estimation.criterion import cost_of
@@ -52,7 +53,7 @@ class UnloggedForm:
     """A model under another form of controller.
 
     Its fit, the controller, what that has in words, its finding; its score, and that of the selected model under the given
-    controller. found: the numbers of the form.
+    controller. found: the numbers of the form. gains: the score of the best model under other gains.
     """
 
     fit: Fit
@@ -62,14 +63,27 @@ class UnloggedForm:
     score: float
     selected: float
     found: FoundNumbers
+    gains: float = np.inf
 
     def better(self, margin: float) -> bool:
-        """Whether it explains the records better than the selected model does under the given controller."""
-        return self.score < self.selected - margin
+        """Whether it explains the records better than other gains do, and the selected model under the given controller."""
+        return self.before_gains(margin) and self.score < self.selected - margin
 
     def as_good(self, margin: float) -> bool:
-        """Whether the records do not tell it from the selected model."""
-        return self.score < self.selected + margin
+        """Whether the records do not tell it from the selected model, and prefer it to other gains."""
+        return self.before_gains(margin) and self.score < self.selected + margin
+
+    def before_gains(self, margin: float) -> bool:
+        """Whether the records prefer it to other gains; what they do not tell from other gains comes after these."""
+        return self.score <= self.gains - margin
+
+    def rivals_of_gains(self, margin: float) -> dict[str, Text]:
+        """{its finding: its numbers and the inertia that comes with it} where it explains as much as other gains, else {}."""
+        if not self.score < self.gains + margin:
+            return {}
+        inertia, _ = moved(self.fit, self.fit).get("inertia", (np.nan, np.nan))
+        shown = joined(", ", (_shown(name, e) for name, e in self.finding.parameters.items()))
+        return {self.finding.effect: say("{} ({}), with an inertia of {:.4g} {kg m^2}", self.words, shown, inertia)}
 
 
 def in_series(fit: Fit) -> tuple[str, ...]:
@@ -77,13 +91,13 @@ def in_series(fit: Fit) -> tuple[str, ...]:
     return tuple(t.name for t in fit.parameters.terms if t.in_series)
 
 
-def unlogged_form(space: Moves, final: Fit, doubtful: bool = False) -> UnloggedForm | None:
+def unlogged_form(space: Moves, final: Fit, better: OtherGains | None = None, doubtful: bool = False) -> UnloggedForm | None:
     """The form of controller with which a model explains the records best.
 
     Searched beside the selected model, with or without its effects in series, and beside mechanisms that are found anew.
     None where a torque is logged, or where the loop is not closed by a bare PI from rest.
     None also where the model leaves noise and contains no effect in series, which a filter could replace.
-    doubtful: whether its mechanism is none of an axis, or other gains explain the records better.
+    better: other gains that explain the records better; doubtful: whether there are such, or its mechanism is none of an axis.
     """
     data, series = space.data, in_series(final)
     settled = leaves_noise(space, final) and not doubtful
@@ -110,15 +124,19 @@ def unlogged_form(space: Moves, final: Fit, doubtful: bool = False) -> UnloggedF
         starts = [(form, under, fit, z) for form in VARIANTS for under, fit, z in _anew(space, objective, final, form)]
         known = _ends(space, objective, beyond, starts, known)
     known = _ends(space, objective, beyond, _once_more(space, objective, data.pi, known), known)
-    best = min(known, key=lambda f: f[1], default=None)
-    if best is None or any(f[2].finding == OTHER_GAINS and f[1] < best[1] + space.margin for f in known):
+    best = min((f for f in known if f[2].finding != OTHER_GAINS), key=lambda f: f[1], default=None)
+    if best is None:
         return None
+    gains = min((f[1] for f in known if f[2].finding == OTHER_GAINS), default=np.inf)
+    gains = gains if better is None else min(gains, better.score)
     fit, score, variant, numbers, stds = best
     z = numbers.at
     selected = min(space.score(final), space.score(_opened(space, final)))
-    close = {f[2]: f[2].words for f in known if f[1] < score + space.margin and f[2].finding != variant.finding}
+    close = {
+        f[2]: f[2].words for f in known if f[1] < score + space.margin and f[2].finding not in (variant.finding, OTHER_GAINS)
+    }
     finding = _finding(variant, z, stds, selected - score, list(close.values()))
-    return UnloggedForm(fit, variant.of(data.pi, z), variant.words, finding, score, selected, numbers)
+    return UnloggedForm(fit, variant.of(data.pi, z), variant.words, finding, score, selected, numbers, gains)
 
 
 def _explains(space: Moves, fit: Fit) -> bool:
@@ -230,13 +248,22 @@ def _once_more(space: Moves, objective: Objective, pi: PI, ends: Sequence[_End])
     Wrong numbers of a form hide them: that torque may only be worth it with other numbers.
     """
     starts: list[_Start] = []
+    both = len({end[0].predictor.closed for end in ends}) > 1  # else all were compared under one predictor
     for form in VARIANTS:
         best = min((end for end in ends if end[2] is form), key=lambda end: end[1], default=None)
         if best is not None:
             fit, under, z = with_usual_effects(space, objective, best[0]), _under(space, pi, form), best[3].at
             starts += [(form, under, fit, z)] * (len(fit.effects) > len(best[0].effects))
             starts += [(form, under, waved, z) for waved in with_wave(space, objective, fit)]
+            if both:
+                starts.append((form, under, _otherwise_predicted(space, best[0]), z))
     return starts
+
+
+def _otherwise_predicted(space: Moves, fit: Fit) -> Fit:
+    """The fit as led in the loop where the torque drives it, and as driven by the torque where it is led in the loop."""
+    predictor = OpenLoop(space.data, fit.predictor.own_angle) if fit.predictor.closed else space.closed(fit.predictor)
+    return replace(fit, hypothesis=fit.hypothesis.driven_by(predictor))
 
 
 def _fitted(
