@@ -6,10 +6,13 @@ import difflib
 import importlib.util
 import math
 import os
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
+from typing import TypeVar
 
 from gaident.errors import GaidentError
+
+T = TypeVar("T")
 
 LARGEST = 1e30  # no decision: what an argument may be: far beyond counters of 64 bits, far below where squares overflow
 SHORTEST, LONGEST = 1e-12, 1e9  # no decision: what an argument may be: sample times [s]
@@ -113,3 +116,17 @@ def _nearest(value: object, names: list[str]) -> str:
     if not close:
         return ""
     return f" (did you mean {next(name for name in names if name.lower() == close[0])!r}?)"
+
+
+def several(given: object, kind: type[T], name: str, error: type[GaidentError], remedy: str) -> tuple[T, ...]:
+    """One of a kind, or a list of them, as a tuple of at least one; remedy: what to give."""
+    if isinstance(given, kind):
+        return (given,)
+    if not isinstance(given, Sequence) or isinstance(given, str | bytes):
+        raise error(f"{name} is {type(given).__name__}: {remedy}")
+    if not given:
+        raise error(f"{name} is empty: {remedy}")
+    for i, one in enumerate(given):
+        if not isinstance(one, kind):
+            raise error(f"{name}[{i}] is {type(one).__name__}: {remedy}")
+    return tuple(given)

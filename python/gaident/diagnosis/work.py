@@ -48,7 +48,7 @@ from gaident.diagnosis.library.record import findings_of_the_record
 from gaident.diagnosis.library.sides import called_of, name_of
 from gaident.diagnosis.library.terms import LIBRARY, in_controller
 from gaident.diagnosis.linear_part import linear_of_part
-from gaident.diagnosis.mechanics import base_shift, mechanics_of, of_no_axis, of_the_age
+from gaident.diagnosis.mechanics import base_shift, mechanics_of, moved, of_no_axis, of_the_age
 from gaident.diagnosis.note import Note
 from gaident.diagnosis.records.folded import ADVICE, folded
 from gaident.diagnosis.records.hygiene import cleaned, left_out, quantisation, unexplained
@@ -202,7 +202,7 @@ class Work:
         """
         better, given = self.gain_doubt.better, first or self
         if better is not None and given.form is not None:
-            better = replace(better, rivals=given.form.rivals_of_gains(given.found.space.margin))
+            better = replace(better, rivals=given.form.rivals_of_gains(given.found.space.margin, moved))
         if better is None or first is None or first is self:
             return better
         same = first.found.space.whitens == self.found.space.whitens  # else the two are no BIC of the same errors

@@ -30,5 +30,16 @@ class RetunedGains:
     swings_on: float = remedy(
         0.05, "1", "of the step of the command, by which the velocity still swings at rest: a limit cycle that is reported"
     )
+    near_limit: float = remedy(
+        0.9, "1", "of the largest torque asked for, from which a step that comes near it is said to hold the gains low"
+    )
+    dies_out: float = remedy(
+        0.9,
+        "1",
+        "of the swing in the first half of a rest: where less is left in the second half, it dies out and is no limit cycle",
+    )
+    winds_up: float = remedy(
+        0.1, "1", "of the step of the command, by which the velocity goes beyond it behind a limit: a held integral is tried"
+    )
     sticks: float = remedy(0.1, "1", "of the time at a slow command, in which the axis stands: stick-slip that is reported")
     slow_command: float = remedy(0.02, "1", "of the step of the command, the slow speed at which stick-slip is looked for")

@@ -246,6 +246,9 @@ class Decisions:
         1e-3, "1", "most that an effect leaves of the replay's squared error, and of the torque's, where it explains it"
     )
     replay_noise: float = loop(0.1, "1", "part of the torque's standard deviation: more is no noise of a measured torque")
+    rare_errors: float = loop(
+        0.5, "1", "of the squares, in the largest hundredth of samples: more is no noise; normal noise has 0.09"
+    )
     same_gains: float = loop(1e-2, "1", "relative difference of the gains of several logs, up to which they are the same")
     gain_doubt: float = loop(
         0.2, "1", "of a given gain, by which it may be off where no torque is logged that would show it", DRIVES
@@ -257,9 +260,7 @@ class Decisions:
     same_slope: float = loop(0.2, "1", "relative difference from a command's median slope, within which its rate is limited")
     better_reason: float = loop(0.99, "1", "of the rms that a simpler reason leaves: a more complicated one has to leave less")
     rounded_command: float = loop(5e-5, "1", "of the largest command: two commands of a log of few decimals differ by no more")
-    log_late: int = loop(
-        3, "samples", "by which a log may have written a channel late or early, at most; farther off is another log", LAGS
-    )
+    log_late: int = loop(3, "samples", "by which a log writes a channel late or early, at most; farther off is another log", LAGS)
     log_shift: float = loop(
         50.0,
         "BIC units",

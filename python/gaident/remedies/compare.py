@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gaident.axis import said, say, unit
+from gaident.checks import several
 from gaident.control.controller import Controller, checked_controller
 from gaident.data.record import Record
 from gaident.data.signals.difference import is_difference_at_clock
@@ -139,9 +140,7 @@ def compare(
     """
     checked_controller(controller)
     named = dict(models) if isinstance(models, Mapping) else {str(i): m for i, m in enumerate(_listed(models), 1)}
-    records = (rec,) if isinstance(rec, Record) else rec
-    if not isinstance(records, Sequence) or not records or not all(isinstance(r, Record) for r in records):
-        raise SettingsError(f"rec is {type(rec).__name__}: give a gaident.Record or a list of them")
+    records = several(rec, Record, "rec", SettingsError, "give a gaident.Record or a list of them")
     if not named:
         raise SettingsError("models is empty: give one model at least")
     data = _taken(list(named.values()), records, controller)

@@ -20,16 +20,14 @@ __all__ = ["beyond_the_records", "doubts_of", "no_gains", "shown_up_to"]
 
 Vector = NDArray[np.float64]
 
-FALSIFIED = (
-    "The data contradict this model: the linear model is falsified. Gains that are designed on it may be wrong; diagnose first."
-)
+FALSIFIED = "The data contradict this model: the linear model is falsified. What is designed on it may be wrong; diagnose first."
 LEFT = (
     "The data contradict this model: the verdict of the diagnosis is {}, and something that the model lacks is left. "
-    "Gains that are designed on it may be wrong."
+    "What is designed on it may be wrong."
 )
 NOT_FOLLOWED = (
-    "The logged {torque} does not follow from the controller: what is called the loop before is not the drive's, and other "
-    "parts of the controller may act beside these gains."
+    "The logged {torque} does not follow from the controller: the loop that is simulated is not the drive's, and other parts of "
+    "the controller may act beside what is proposed."
 )
 NO_GAINS = "No gains were found with which every drive that the records leave possible is stable in the velocity loop: {}"
 STAY = "the given ones stay."

@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from gaident.axis import checked_axis, linear_sentences, said, say, unit
-from gaident.checks import one_of, size_of_drive
+from gaident.checks import one_of, several, size_of_drive
 from gaident.data.record import Record
 from gaident.errors import RecordError, SettingsError
 from gaident.estimation.regression.inverse_dynamics import inverse_dynamics
@@ -278,14 +278,13 @@ def friction_map(
     viscous friction + coulomb friction 0.02 0.3
     """
     checked_axis(axis)
-    given = (records,) if isinstance(records, Record) else records
-    if not isinstance(given, Sequence) or not given or not all(isinstance(r, Record) for r in given):
-        raise SettingsError(f"records is {type(records).__name__}: give a gaident.Record or a list of them")
+    given = several(records, Record, "records", SettingsError, "give a gaident.Record or a list of them")
     if isinstance(bins, bool) or not isinstance(bins, int) or not FEWEST <= bins <= MOST:
         raise SettingsError(f"bins is {bins!r}: give a whole number from {FEWEST} to {MOST}")
-    for rec in given:
+    for i, rec in enumerate(given):
         if rec.torque is None:
-            raise RecordError(f"record {rec.name!r} has no torque: its friction does not show; log it")
+            which = f"record {rec.name!r}" if rec.name else f"records[{i}]"
+            raise RecordError(f"{which} has no torque: its friction does not show; log it")
     known = None if inertia is None else size_of_drive(inertia, "inertia", SettingsError, "give a number > 0, or None")
     heat = _temperatures(temperature, given, isinstance(records, Record))
     mass = _regressed(given, axis) if known is None else known

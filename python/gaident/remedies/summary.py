@@ -53,4 +53,7 @@ def _mended(result: Retuning, axis: str) -> list[str]:
         return []
     rows = [("if mended", "error now", "then", unit("rad/s", axis))]
     rows += [(str(said(called(name), axis)), number(now), number(then), "") for name, now, then in result.mended]
-    return ["If a cause is mended, the error of the velocity under the proposal, rms of a step and a slow speed", *table(rows)]
+    return [
+        "If a cause is mended, the error of the velocity under the proposal, rms once a step has settled, and at a slow speed",
+        *table(rows),
+    ]

@@ -89,7 +89,7 @@ def joint_parameters(
     whole, motor, shaft = _mechanism(model, words)
     kept = _kept(model)
     sides = [_friction([e for e in kept if e.at_load is load], highest, words) for load in (False, True)]
-    (level, slope), (far_level, far_slope) = sides
+    (level, slope, uneven), (far_level, far_slope, far_uneven) = sides
     inertia, damping = whole
     rest = max((e.parameters["static_torque"] for e in kept if "static_torque" in e.parameters), default=0.0)
     slow = [e.parameters["stribeck_velocity"] for e in kept if "stribeck_velocity" in e.parameters]
@@ -100,7 +100,7 @@ def joint_parameters(
         inertia=inertia,
         damping=damping + slope + far_slope,
         friction=friction,
-        load=constant,
+        load=constant + uneven + far_uneven,
         motor=(motor[0], motor[1] + slope, level) if shaft else (inertia, damping + slope + far_slope, friction),
         shaft=shaft,
         breakaway=max(rest, friction),
@@ -154,10 +154,13 @@ def _is_lag(effect: Effect) -> bool:
     return effect.row.place == "actuator" and "time_constant" in effect.parameters
 
 
-def _friction(effects: list[Effect], highest: float | None, words: list[Text]) -> tuple[float, float]:
-    """(level [N m], slope [N m s/rad]) of the line nearest to the friction of both directions."""
+def _friction(effects: list[Effect], highest: float | None, words: list[Text]) -> tuple[float, float, float]:
+    """(level [N m], slope [N m s/rad]) of the line nearest to the friction of both directions, and a constant torque [N m].
+
+    With F+ and F- the friction of the two directions, the constant part of (F+ - F-)/2 is the torque of a constant load.
+    """
     if not effects:
-        return 0.0, 0.0
+        return 0.0, 0.0, 0.0
 
     def both(w: Vector) -> tuple[Vector, Vector]:
         forth, back = np.zeros(len(w)), np.zeros(len(w))
@@ -181,9 +184,15 @@ def _friction(effects: list[Effect], highest: float | None, words: list[Text]) -
     at = WIDE if highest is None else np.linspace(0.0, highest, POINTS + 1)[1:]
     forth, back = both(at)
     apart = float(np.max(np.abs(forth - back)))
-    if apart > STRAIGHT * float(np.max(forth + back)):
-        words.append(say("The friction of both directions differs by up to {:.2g} {N m}: the joint has its mean.", apart))
-    return level, slope
+    if not apart > STRAIGHT * float(np.max(forth + back)):
+        return level, slope, 0.0
+    constant = float(np.polynomial.Polynomial.fit(at, 0.5 * (forth - back), 1)(0.0))
+    text = (
+        "The friction of both directions differs by up to {:.2g} {N m}: the joint has its mean, and {:.2g} {N m} of "
+        "constant load."
+    )
+    words.append(say(text, apart, constant))
+    return level, slope, constant
 
 
 def _line(w: Vector, friction: Vector) -> tuple[float, float, float]:

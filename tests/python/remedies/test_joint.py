@@ -125,6 +125,10 @@ def test_what_is_no_straight_line_and_what_a_joint_has_not() -> None:
     )
     mean = ga.joint_parameters(uneven)
     assert mean.friction == pytest.approx(0.2) and "both directions differs by up to 0.2 N m" in mean.left_out[0]
+    assert mean.load == pytest.approx(-0.1) and "and -0.1 N m of constant load" in mean.left_out[0]
+    assert mean.to_wpilib()["kG"] == pytest.approx(-0.1), "the same torques as dry friction of 0.2 N m and that load"
+    steeper = {"torque_positive": 0.2, "torque_negative": 0.1, "viscous_positive": 2e-3, "viscous_negative": 0.0}
+    assert ga.joint_parameters(ONE.with_effect("asymmetric_friction", **steeper)).load == pytest.approx(0.05)
     turning = ONE.with_effect("position_friction", torque=0.05, amplitude=0.5, order=2.0, phase=0.0)
     assert "changes with the angle" in ga.joint_parameters(turning).left_out[0]
     many = ga.Model(4000.0, [-12.0, -6 + 160j, -6 - 160j, -20 + 420j, -20 - 420j], [-3 + 95j, -3 - 95j, -8 + 380j, -8 - 380j])

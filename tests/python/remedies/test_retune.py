@@ -161,12 +161,51 @@ def test_effects_that_are_not_linear_are_simulated(tuned: ga.Retuning) -> None:
     assert name == "stribeck_friction" and then < now
     shown = replace(tuned, mended=((name, now, then),), simulated=told).summary()
     assert "if mended" in shown and "stick-slip" in shown
-    loose = ga.TwoMass(JM=2e-4, DM=1e-4, JL=4e-4, DL=1e-4, KG=40.0, DG=4e-3).model().with_effect("backlash", gap=0.2)
-    told = simulated_with(loose, GIVEN, ga.PI(0.2, 60.0), T, 2.0, tuned.after)
-    assert any("limit cycle" in s for s in told), told
     told = simulated_with(LAGGED, GIVEN, ga.PI(0.06, 3.0, torque_limit=0.5), T, 60.0, tuned.after)
     assert any("reaches the limit" in s for s in told)
     assert not simulated_with(LAGGED, GIVEN, tuned.controller, T, 20.0, tuned.after)
+
+
+@pytest.mark.parametrize(("kp", "ki", "gap", "cycle"), [(0.02, 50.0, 0.02, True), (0.2, 60.0, 0.2, False)])
+def test_a_swing_at_rest_is_a_limit_cycle_where_it_does_not_die_out(
+    tuned: ga.Retuning, kp: float, ki: float, gap: float, cycle: bool
+) -> None:
+    """In a wide gap it takes seconds to die out, a hundred times longer than the linear loop takes to settle."""
+    shaft = ga.TwoMass(JM=2e-4, DM=1e-4, JL=4e-4, DL=1e-4, KG=40.0, DG=4e-3).model().with_effect("backlash", gap=gap)
+    told = simulated_with(shaft, GIVEN, ga.PI(kp, ki), T, 2.0, tuned.after)
+    assert any("limit cycle" in s for s in told) is cycle, told
+    command = np.repeat([0.0, 2.0, 0.0], [1, 4000, 16000])
+    velocity = ga.run(shaft, ga.Record(T, command=command, velocity=0.0 * command), ga.PI(kp, ki)).velocity
+    assert (float(np.ptp(velocity[-2000:])) > 1.0) is cycle
+
+
+@pytest.mark.long
+def test_an_integral_that_winds_up_behind_a_limit_is_named_with_its_remedy_and_is_no_limit_cycle() -> None:
+    drive, given = ga.OneMass(J=1e-3, D=2e-3).model(), ga.PI(0.05, 1.0, torque_limit=0.4)
+    command = 2.0 * np.repeat([20.0, -30.0, 10.0, -5.0, 40.0, -20.0, 3.0, 0.0], 300)
+    noise = 0.02 * np.random.default_rng(7).standard_normal(len(command))
+    run = ga.run(drive, ga.Record(T, command=command - noise, velocity=noise), given)
+    rec = ga.Record(T, command=command, velocity=run.velocity + noise, torque=run.torque)
+    found = ga.diagnose(rec, given, seed=1)
+    tuned = ga.retune(found)
+    # A limit that the given gains exceed by themselves is no reason for a soft loop.
+    assert tuned.after.stiffness.value > tuned.before.stiffness.value
+    assert tuned.torque_limit == tuned.before.step_torque.value > 6.0
+    notes = " ".join(tuned.notes)
+    assert "asks for 6.06 N m, more than the limit of 0.4 N m" in notes
+    told = " ".join(ga.retune(found, torque_limit=100.0, most_times=3.0).simulated)
+    up = np.repeat([0.0, 120.0], [1, 3000])
+    loop = ga.PI(0.15, 3.0, torque_limit=0.4)
+    beyond = 100.0 * (
+        float(np.max(ga.run(found.model, ga.Record(T, command=up, velocity=0.0 * up), loop).velocity)) / 120.0 - 1.0
+    )
+    assert f"the velocity then goes {beyond:.3g} % beyond it" in told and beyond > 40.0
+    assert 'held there, anti_windup="hold", the velocity goes 0 % beyond the step' in told and "limit cycle" not in told
+    low = ga.retune(found, torque_limit=0.4)
+    assert low.torque_limit == 0.4 and low.after.step_torque.value <= 0.4 * 1.001
+    assert "times as stiff as it is: a step of 120 rad/s may ask for 0.4 N m" in " ".join(low.notes)
+    saved = ga.retune(ga.Diagnosis.from_dict(found.to_dict()), dt=T)
+    assert "one of 1 rad/s is taken" in " ".join(saved.notes)
 
 
 def test_it_is_saved_drawn_and_told(tuned: ga.Retuning, tmp_path: Path) -> None:

@@ -136,7 +136,9 @@ def test_wrong_use_is_told(rec: ga.Record) -> None:
         ga.compare([], rec)
     with pytest.raises(ga.GaidentError, match="models is int"):
         ga.compare(3, rec)  # type: ignore[arg-type]
-    with pytest.raises(ga.GaidentError, match="rec is list"):
+    with pytest.raises(ga.GaidentError, match="rec is empty: give a gaident"):
         ga.compare([STUCK], [])
+    with pytest.raises(ga.GaidentError, match=r"rec\[1\] is int"):
+        ga.compare([STUCK], [rec, 3])  # type: ignore[list-item]
     with pytest.raises(ga.GaidentError, match="rec is str"):
         ga.compare([STUCK], "rec")  # type: ignore[arg-type]

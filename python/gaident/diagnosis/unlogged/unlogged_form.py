@@ -15,7 +15,7 @@ It is judged by the criterion that selected the model.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -26,7 +26,6 @@ from gaident.axis import Text, joined, say, unit_text
 from gaident.control.cascade import Cascade
 from gaident.control.found import NUMBER_STEP, FoundNumbers
 from gaident.control.pi import PI
-from gaident.diagnosis.mechanics import moved
 from gaident.diagnosis.selection.moves import Moves
 from gaident.diagnosis.unlogged.anew import dry_friction, mechanisms_under, with_term, with_usual_effects, with_wave
 from gaident.diagnosis.unlogged.controller_forms import VARIANTS, ControllerForm
@@ -77,11 +76,14 @@ class UnloggedForm:
         """Whether the records prefer it to other gains; what they do not tell from other gains comes after these."""
         return self.score <= self.gains - margin
 
-    def rivals_of_gains(self, margin: float) -> dict[str, Text]:
-        """{its finding: its numbers and the inertia that comes with it} where it explains as much as other gains, else {}."""
+    def rivals_of_gains(self, margin: float, mechanics: Callable[[Fit, Fit], dict[str, tuple[float, float]]]) -> dict[str, Text]:
+        """{its finding: its numbers and the inertia of its model} where it explains as much as other gains, else {}.
+
+        mechanics: of two fits, name -> values of both.
+        """
         if not self.score < self.gains + margin:
             return {}
-        inertia, _ = moved(self.fit, self.fit).get("inertia", (np.nan, np.nan))
+        inertia, _ = mechanics(self.fit, self.fit)["inertia"]
         shown = joined(", ", (_shown(name, e) for name, e in self.finding.parameters.items()))
         return {self.finding.effect: say("{} ({}), with an inertia of {:.4g} {kg m^2}", self.words, shown, inertia)}
 

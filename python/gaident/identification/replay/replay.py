@@ -23,15 +23,7 @@ from gaident.control.pi import PI, bare_pi
 from gaident.data.record import Record
 from gaident.data.signals.lattice import digits_step, lattice_step, place_step, rounding_step
 from gaident.errors import RecordError
-from gaident.identification.replay.causes import (
-    Explanation,
-    control_error,
-    explain,
-    follows_past,
-    rounded_command,
-    under_load,
-    white_noise,
-)
+from gaident.identification.replay.causes import Explanation, control_error, explain, rounded_command, under_load, white_noise
 from gaident.models.made_torque import stored_torque
 from gaident.policy.table import POLICY
 
@@ -133,8 +125,7 @@ def _compared(rec: Record, command: Vector, controller: Controller, logged: Vect
         if pi is not None and rounded_command(off, command, rec.dt, pi):
             text = say("{}, to {:.1g} {N m}, which is the rounding of the log.", head, maximum)
             return Replay(*figures, True, "", np.nan, None, text)
-        noise = white_noise(off, logged[: len(off)])
-        if noise and (pi is None or not follows_past(off, command - rec.velocity)):
+        if noise := white_noise(off, logged[: len(off)]):
             measured = "{} up to white noise of {:.2g} {N m} rms: it is a measured {torque}, or a coarsely rounded one."
             text = say(measured, head, noise)
             return Replay(*figures, True, "", np.nan, None, text)

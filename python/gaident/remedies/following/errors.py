@@ -27,7 +27,8 @@ SIMULATED = (
 REPLACED = "The tables stand in the place of the controller's own feedforward of acceleration and friction."
 BLOW = (
     "With the tables the loop asks for more than twice the {torque} of before, for the acceleration of a command that jumps: "
-    "where the drive cannot give that, it follows less well than this."
+    "where the drive cannot give that, it follows less well than this. Give the command a ramp that the drive can follow, or "
+    "leave the acceleration out."
 )
 LAG = (
     "A position controller without the whole velocity feedforward lags behind a moving command by its velocity over the position "

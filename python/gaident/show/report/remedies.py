@@ -8,6 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from gaident.axis import called, percent, said, unit, velocity_unit, word
+from gaident.policy.table import POLICY
 from gaident.results.retuning import Retuning
 from gaident.show.chart import Chart, Panel, Trace, series
 from gaident.show.html import Html, Row, filled_table, joined, number, table, tag, typeset
@@ -82,8 +83,8 @@ def _gains(do: Remedies, view: View, drawn: Charts) -> Html:
 
 
 def _more(tuned: Retuning) -> Html:
-    command = "gaident retune RESULT.json --dt {:.6g} --phase-margin {:g} --gain-margin {:g}"
-    text = command.format(tuned.period, tuned.phase_margin, tuned.gain_margin)
+    command = "gaident retune RESULT.json --dt {:.6g} --phase-margin {:g} --gain-margin {:g} --step {:.6g} --most-times {:g}"
+    text = command.format(tuned.period, tuned.phase_margin, tuned.gain_margin, tuned.step, POLICY.raised)
     return tag("p", tag("small", "With other margins, a limit of the step or filters: "), tag("code", text, class_="command"))
 
 
