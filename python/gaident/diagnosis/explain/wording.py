@@ -65,14 +65,20 @@ def evidence_of(
     if ends.apart:
         what = say("{}, {}", what, end_words(ends.sides))
     there = f", with it {end_words((ends.other,))} {ends.worse:.0f}" if ends.worse > 0.0 else ""
-    at_bound = known is not None and any(e.at_bound for e in known[0].values())
-    sure, worse = certainty(gain, left or at_bound), f"(the model without it is {gain:.0f} BIC units worse{there})"
+    doubtful = known is not None and (any(e.at_bound for e in known[0].values()) or not _clear(known[0]))
+    sure, worse = certainty(gain, left or doubtful), f"(the model without it is {gain:.0f} BIC units worse{there})"
     if alternatives:
         others = joined(" or ", map(called, alternatives))
         return say("{}, or {}: one of these is there, {} {}; these data do not say which.", what, others, sure, worse)
     if offset is not None and effect == offset.effect:
         return say("{}: {} {}. {}", what, sure, worse, offset.sentence)
     return say("{}: {} {}.{}", what, sure, worse, "" if known is None else _at_speed(effect, *known))
+
+
+def _clear(parameters: Mapping[str, Estimate]) -> bool:
+    """Whether one of an effect's parameters at least is not 0 by its deviation; an effect without any is as clear as its gain."""
+    known = [e for e in parameters.values() if e.std > 0.0]
+    return not known or any(abs(e.value) > POLICY.check_deviations * e.std for e in known)
 
 
 def _orders(parameters: Mapping[str, Estimate]) -> Text | str:
