@@ -115,8 +115,8 @@ def plot_retuning(result: Retuning, axis: str = "rotary") -> Figure:
     size.set_ylabel("size of the loop")
     phase.set_ylabel("phase [deg]")
     phase.set_xlabel("frequency [Hz]")
-    answer.set_ylabel(f"velocity [{velocity_unit(axis)}]")
-    answer.set_xlabel("time after a step of 1 [s]")
+    answer.set_ylabel(f"velocity, command 1 [{velocity_unit(axis)}]")
+    answer.set_xlabel("time after a step of the command [s]")
     answer.set_xlim(0.0, _shown_time(result))
     size.legend()
     return figure

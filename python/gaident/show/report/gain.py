@@ -99,12 +99,11 @@ def _left(dia: Diagnosis, axis: str) -> list[str]:
     verdict = "Nothing of it is significant." if dia.driver is None else typeset(left_words(dia, axis))
     parts: list[str] = [tag("h3", "What the rest depends on")]
     parts.append(tag("p", verdict, " BIC units gained by a free function of each; below 0 it is not worth its parameters."))
+    needed = f"A signal counts above {dia.left_needed:.0f} units."
     if dia.driver is None and dia.left_needed > 0.0:
-        parts.append(tag("p", f"Above {dia.left_needed:.0f} one counts."))
+        parts.append(tag("p", needed))
     if dia.driver is not None and not counts:
-        parts.append(
-            tag("p", f"Above {dia.left_needed:.0f} one counts. Of what does not, the closest takes most of the error away.")
-        )
+        parts.append(tag("p", needed, " None does; the closest takes most of the squared error away."))
     parts.append(table(("", "BIC units", "", "of the squared error [%]" if shares else ""), [lines]))
     return parts
 
