@@ -357,7 +357,7 @@ class Decisions:
     form_fastest: float = loop(
         0.1, "samples", "of the log: a shorter time constant of an unlogged controller's filter shows in none", UNLOGGED
     )
-    form_weight: float = loop(2.0, "1", "highest command weight of an unlogged controller: 0 is an IP, 1 a PI one", UNLOGGED)
+    form_weight: float = loop(1.0, "1", "highest command weight of an unlogged controller: 0 is an IP, 1 a PI one", UNLOGGED)
     form_slowest: float = loop(
         0.1,
         "1",
