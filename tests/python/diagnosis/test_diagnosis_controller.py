@@ -79,6 +79,19 @@ def test_a_filter_of_the_torque_is_no_shift_with_other_gains() -> None:
     assert replay(rec, filtered).follows
 
 
+@pytest.mark.parametrize(("spikes", "size"), [(1, 0.1), (10, 0.1), (3, 0.3)])
+def test_a_measured_torque_with_spikes_follows(spikes: int, size: float) -> None:
+    """One spike of half the torque's deviation has more squares than the noise of 2400 samples."""
+    rng, pi = np.random.default_rng(1), ga.PI(0.05, 1.0)
+    command = np.repeat([20.0, -30.0, 10.0, -5.0, 40.0, -20.0, 3.0, 0.0], 300)
+    drive = ga.OneMass(J=1e-3, D=2e-3).model().with_effect("coulomb_friction", torque=0.03)
+    run = ga.run(drive, ga.Record(1e-3, command=command, velocity=0.0 * command), pi)
+    torque = run.torque + 1e-3 * rng.standard_normal(len(command))
+    torque[rng.choice(len(command), spikes, replace=False)] += size * rng.choice([-1.0, 1.0], spikes)
+    told = replay(ga.Record(1e-3, command=command, velocity=run.velocity, torque=torque), pi)
+    assert told.follows and "and a few spikes: it is a measured torque" in told.sentence
+
+
 def test_white_noise_is_everywhere() -> None:
     """Normal noise and noise with long tails are noise; a few large errors are not, however white."""
     rng = np.random.default_rng(1)

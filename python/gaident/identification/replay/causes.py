@@ -17,7 +17,7 @@ from gaident.identification.adequacy import white_lags
 from gaident.identification.noise import chi2_tail, ljung_box
 from gaident.policy.table import POLICY
 
-__all__ = ["Explanation", "control_error", "explain", "rounded_command", "under_load", "white_noise"]
+__all__ = ["Explanation", "beside_spikes", "control_error", "explain", "rounded_command", "under_load", "white_noise"]
 
 Vector = NDArray[np.float64]
 
@@ -128,11 +128,28 @@ def white_noise(off: Vector, logged: Vector) -> float:
     return spread if centred and ljung_box([off], white_lags([len(off)])) > POLICY.test_level else 0.0
 
 
+def beside_spikes(off: Vector, logged: Vector) -> float:
+    """Standard deviation [N m] of `off` without its largest hundredth where that is spikes of a measured torque; 0.0 where not.
+
+    All of it is white then, and so is the rest: of what a filter makes of steps the rest is not, and of a limit it is 0.
+    """
+    spread = float(np.std(off))
+    if not spread < POLICY.replay_noise * float(np.std(logged)) or ljung_box([off], white_lags([len(off)])) <= POLICY.test_level:
+        return 0.0
+    rest = off.copy()
+    rest[np.argsort(np.abs(off))[-_most(off) :]] = 0.0
+    return white_noise(rest, logged)
+
+
 def _rare(off: Vector) -> bool:
     """Whether the largest hundredth of samples holds more than `rare_errors` of the squares."""
     squares = np.sort(off**2)
-    most = squares[-max(len(off) // RARE, 1) :]
-    return float(np.sum(most)) > POLICY.rare_errors * float(np.sum(squares))
+    return float(np.sum(squares[-_most(off) :])) > POLICY.rare_errors * float(np.sum(squares))
+
+
+def _most(off: Vector) -> int:
+    """A hundredth of the samples."""
+    return max(len(off) // RARE, 1)
 
 
 def _start(case: _Case) -> Iterator[Explanation]:

@@ -23,7 +23,15 @@ from gaident.control.pi import PI, bare_pi
 from gaident.data.record import Record
 from gaident.data.signals.lattice import digits_step, lattice_step, place_step, rounding_step
 from gaident.errors import RecordError
-from gaident.identification.replay.causes import Explanation, control_error, explain, rounded_command, under_load, white_noise
+from gaident.identification.replay.causes import (
+    Explanation,
+    beside_spikes,
+    control_error,
+    explain,
+    rounded_command,
+    under_load,
+    white_noise,
+)
 from gaident.models.made_torque import stored_torque
 from gaident.policy.table import POLICY
 
@@ -137,6 +145,9 @@ def _compared(rec: Record, command: Vector, controller: Controller, logged: Vect
             break
     if found is not None and found.cause == "initial_integral":
         return Replay(*figures, True, found.cause, found.value, None, say("{}, {}", head, found.sentence))
+    if found is None and (noise := beside_spikes(off, logged[: len(off)])):
+        text = say("{} up to white noise of {:.2g} {N m} rms and a few spikes: it is a measured {torque}.", head, noise)
+        return Replay(*figures, True, "", np.nan, None, text)
     departs = int(np.argmax(np.abs(off) > min(allowed.torque, maximum / 2)))  # no decision: printed: where it departs
     head = say(
         "The logged {torque} does not follow from command and velocity through this controller: it departs first at sample "
