@@ -11,8 +11,10 @@ from gaident.axis import say
 from gaident.diagnosis.explain.wording import like_filters, or_other_form
 from gaident.diagnosis.unlogged.controller_forms import VARIANTS
 from gaident.diagnosis.unlogged.other_gains import OtherGains
+from gaident.diagnosis.unlogged.unlogged_form import UnloggedForm
 from gaident.estimation.dataset import DataSet
 from gaident.results.estimate import Estimate
+from gaident.results.finding import Finding
 
 DT = 1e-3
 KP, KI = 0.05, 1.5
@@ -176,6 +178,15 @@ def test_what_explains_as_much_as_other_gains_is_their_alternative_with_the_iner
     assert found.effect == "other_gains" and found.alternatives == ("command_weight",)
     said = "So it does with the given gains and a command weight (weight 0.8), with an inertia of 0.0002 kg m^2. Log the torque"
     assert said in found.evidence
+
+
+def test_a_form_on_a_model_that_is_none_of_an_axis_is_an_alternative_without_an_inertia() -> None:
+    weight = Finding("command_weight", {"weight": Estimate(0.8, 0.01, "1")}, (), 0.0, 0.0, None, say(""), place="controller")
+    form = UnloggedForm(None, PI, say("a command weight"), weight, 1.0, 1.0, None, 1.0)  # type: ignore[arg-type]
+    for mechanics, said in (({}, ")"), ({"inertia": (2e-4, 2e-4)}, "), with an inertia of 0.0002 kg m^2")):
+        found = form.rivals_of_gains(10.0, lambda before, after, known=mechanics: known)  # type: ignore[misc]
+        assert str(found["command_weight"]).startswith("a command weight (") and str(found["command_weight"]).endswith(said)
+    assert form.rivals_of_gains(0.0, lambda before, after: {}) == {}
 
 
 def test_what_comes_closer_is_no_other_part_of_a_controller_that_has_none() -> None:

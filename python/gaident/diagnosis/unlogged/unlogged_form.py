@@ -79,13 +79,14 @@ class UnloggedForm:
     def rivals_of_gains(self, margin: float, mechanics: Callable[[Fit, Fit], dict[str, tuple[float, float]]]) -> dict[str, Text]:
         """{its finding: its numbers and the inertia of its model} where it explains as much as other gains, else {}.
 
-        mechanics: of two fits, name -> values of both.
+        mechanics: of two fits, name -> values of both; without an inertia where a model is none of an axis.
         """
         if not self.score < self.gains + margin:
             return {}
-        inertia, _ = mechanics(self.fit, self.fit)["inertia"]
         shown = joined(", ", (_shown(name, e) for name, e in self.finding.parameters.items()))
-        return {self.finding.effect: say("{} ({}), with an inertia of {:.4g} {kg m^2}", self.words, shown, inertia)}
+        both = mechanics(self.fit, self.fit).get("inertia")
+        inertia = "" if both is None else say(", with an inertia of {:.4g} {kg m^2}", both[1])
+        return {self.finding.effect: say("{} ({}){}", self.words, shown, inertia)}
 
 
 def in_series(fit: Fit) -> tuple[str, ...]:
