@@ -108,7 +108,7 @@ def simulated_with(
         old = _tried(model, given, period, step, after)
     except GaidentError:
         old = new
-    said = [*_limit_cycle(new, old, step, period), *_stick_slip(new, old, step), *_limited(new, model, found, period)]
+    said = [*_limit_cycle(new, old, step, period), *_stick_slip(new, old, step), *_limited(new, old, model, found, period)]
     said += _wound_up(new, model, found, period)
     return tuple(said) or (say("Simulated with all effects of the model, the loop comes to rest and creeps without a stop."),)
 
@@ -175,8 +175,8 @@ def _limit_cycle(new: _Tried, old: _Tried, step: float, period: float) -> list[T
     if new.rests(step):
         return []
     if not new.cycles(step):
-        text = "After {:.3g} s at rest the velocity still moves by +-{:.3g} {rad/s}."
-        return [say(text, (new.part + new.part) * period, new.swing)]
+        text = "{:.3g} s after the command is back at 0 the velocity still moves by +-{:.3g} {rad/s}{}."
+        return [say(text, (new.part + new.part) * period, new.swing, _given(", under the given gains by +-{:.3g}", old.swing))]
     frequency = 0.5 * new.turns / (len(new.last) * period)
     so_far = say("as under the given gains") if old.cycles(step) else say("which the given gains do not make")
     text = "At rest the velocity goes on swinging by +-{:.3g} {rad/s} at about {:.3g} Hz, a limit cycle, {}."
@@ -195,14 +195,20 @@ def _stick_slip(new: _Tried, old: _Tried, step: float) -> list[Text]:
     return [say(text, slow, 100.0 * stands, 100.0 * before)]
 
 
-def _limited(new: _Tried, model: Model, found: Controller, period: float) -> list[Text]:
+def _limited(new: _Tried, old: _Tried, model: Model, found: Controller, period: float) -> list[Text]:
     behind = [e.parameters["limit"] for e in model.effects if e.row.place == "actuator" and "limit" in e.parameters]
     limit = min(found.limits[0], *behind, math.inf)
     samples = int(np.sum(np.abs(new.run.torque[: new.part]) >= limit * (1.0 - 1e-9)))
     if samples == 0:
         return []
-    text = "A step of {:.3g} {rad/s} reaches the limit of {:.3g} {N m} for {:.3g} s; the velocity then goes {:.3g} % beyond it."
-    return [say(text, float(np.max(np.abs(new.command))), limit, samples * period, new.beyond())]
+    text = "A step of {:.3g} {rad/s} reaches the limit of {:.3g} {N m} for {:.3g} s; the velocity then goes {:.3g} % beyond it{}."
+    before = _given(", under the given gains {:.3g} %", old.beyond())
+    return [say(text, float(np.max(np.abs(new.command))), limit, samples * period, new.beyond(), before)]
+
+
+def _given(text: str, value: float) -> Text | str:
+    """What is said of the given gains; nothing where the loop runs away under them."""
+    return say(text, value) if math.isfinite(value) else ""
 
 
 def _wound_up(new: _Tried, model: Model, found: Controller, period: float) -> list[Text]:

@@ -317,10 +317,13 @@ def _no_less_than_now(asked: Asked, before: LoopFigures) -> tuple[Asked, list[Te
 
 
 def _step_not_known(result: Identification | Diagnosis, asked: Asked, step: float | None) -> list[Text]:
-    """A note where a limit of the torque is of a step that nobody gave and no record shows, as a saved result has none."""
+    """A note where a limit of the torque is of a step that nobody gave and no record shows.
+
+    A saved result has no records, and those of a position controller have the command of a position.
+    """
     if step is not None or asked.torque_limit is None or any(r.command is not None for r in result.records):
         return []
-    text = "No record is at hand that shows the steps of the command: one of {:.3g} {rad/s} is taken; give step, or --step."
+    text = "No record shows the steps of a velocity command: one of {:.3g} {rad/s} is taken; give step, or --step."
     return [say(text, asked.step)]
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -177,6 +178,26 @@ def test_a_swing_at_rest_is_a_limit_cycle_where_it_does_not_die_out(
     command = np.repeat([0.0, 2.0, 0.0], [1, 4000, 16000])
     velocity = ga.run(shaft, ga.Record(T, command=command, velocity=0.0 * command), ga.PI(kp, ki)).velocity
     assert (float(np.ptp(velocity[-2000:])) > 1.0) is cycle
+
+
+def test_what_a_limit_does_is_told_beside_what_it_does_under_the_given_gains(tuned: ga.Retuning) -> None:
+    """Behind a limit a position loop that is stable without it may swing for ever, where the given gains come to rest."""
+    drive = ga.OneMass(J=1e-3, D=2e-3).model()
+
+    def loop(kp: float, ki: float, gain: float) -> ga.Cascade:
+        return ga.Cascade(ga.PI(kp, ki, torque_limit=0.4), position=ga.P(gain), velocity_feedforward=0.5)
+
+    told = simulated_with(drive, loop(0.05, 1.0, 10.0), loop(0.0473, 3.06, 24.6), T, 60.0, tuned.after)
+    said = re.search(r"back at 0 the velocity still moves by \+-(\S+) rad/s, under the given gains by \+-(\S+)\.$", str(told[0]))
+    assert said is not None and float(said[1]) > 100.0 and float(said[2]) < 1e-3, told
+    assert any(re.search(r"beyond it, under the given gains 68\.8 %\.$", str(s)) for s in told), told
+
+
+def test_a_limit_of_which_no_record_shows_the_step_is_noted(found: ga.Diagnosis) -> None:
+    position = ga.Record(T, position_command=np.zeros(200), velocity=np.zeros(200))
+    for records in ((), (position,)):
+        notes = ga.retune(replace(found, records=records, covariance=None), ga.PI(0.02, 0.5, torque_limit=9.0), dt=T).notes
+        assert any("No record shows the steps of a velocity command: one of 1 rad/s is taken" in s for s in notes), notes
 
 
 @pytest.mark.long
