@@ -35,7 +35,7 @@ SOURCES := pyproject.toml CMakeLists.txt LICENSE README.md \
 ifndef SIDE_BY_SIDE
 .NOTPARALLEL:
 endif
-.PHONY: help install demo test fuzz bench real bare embedded wheel windows tidy docs lint test-cpp test-python test-long clean build-checked test-checked test-sanitized
+.PHONY: help install demo test fuzz bench real bare oldest embedded wheel windows tidy docs lint test-cpp test-python test-long clean build-checked test-checked test-sanitized
 .DEFAULT_GOAL := help
 
 help: ## list the commands
@@ -100,6 +100,11 @@ bare: .venv/.tested ## the package in an empty environment, with what it install
 	$(PYTHON) -m venv build/bare/env
 	build/bare/env/bin/python -m pip install --quiet build/bare/*.whl
 	cd build/bare && env/bin/gaident --help > help.txt && env/bin/gaident doctor
+	@if build/bare/env/bin/python -c 'import sys; sys.exit(sys.version_info >= (3, 12))'; then $(MAKE) --no-print-directory oldest; \
+		else echo "the oldest versions are left out: they have no wheels for this Python" >&2; fi
+
+# In the environment of `bare`.
+oldest:
 	$(call listed,dependencies) | sed -n '/;/!s/>=/==/p' > build/bare/oldest.txt
 	build/bare/env/bin/python -m pip install --quiet --only-binary :all: -r build/bare/oldest.txt pytest hypothesis "mpmath==1.3.*"
 	cd build/bare && env/bin/gaident doctor && env/bin/gaident demo --quiet --out demo

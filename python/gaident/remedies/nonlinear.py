@@ -31,6 +31,7 @@ Vector = NDArray[np.float64]
 SETTLING_TIMES = 6.0  # no decision: a formula: of a part of the command, so that a step has settled in its first half
 SHORTEST, LONGEST = 200, 4000  # no decision: memory: samples of a part at first
 LONGER, TRIES = 4, 3  # no decision: memory: a part is so many times longer where the axis neither rests nor swings on; tries
+SLOW = 3  # no decision: a formula: parts before the slow speed
 HALF = 0.5  # no decision: a formula: of what a velocity moves through
 PERCENT = 100.0  # no decision: a unit
 TURNS = 8  # no decision: a formula: changes of sign in four periods: fewer are no swing that goes on
@@ -118,7 +119,8 @@ def without_each(
 ) -> tuple[tuple[str, float, float], ...]:
     """(effect, error of the velocity with all effects, error without this one), rms [rad/s], for what can be mended.
 
-    Of the second half of each part of the command: what follows a step at once is that of the loop.
+    Of the second half of the step and of the rest, as what follows at once is the loop's.
+    Of all of the slow motion, which dry friction holds at its beginning.
     """
     rows = []
     try:
@@ -142,8 +144,9 @@ def _nonlinear(model: Model) -> bool:
 
 
 def _error(trial: _Tried) -> float:
-    settled = (trial.command - trial.run.velocity).reshape(-1, trial.part)[:, trial.part // 2 :]
-    return float(np.sqrt(np.mean(settled**2)))
+    parts = (trial.command - trial.run.velocity).reshape(-1, trial.part)
+    counted = np.concatenate([parts[:SLOW, trial.part // 2 :].ravel(), parts[SLOW:].ravel()])
+    return float(np.sqrt(np.mean(counted**2)))
 
 
 def _tried(model: Model, controller: Controller, period: float, step: float, after: LoopFigures) -> _Tried:

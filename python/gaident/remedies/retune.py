@@ -28,10 +28,20 @@ from gaident.remedies.nonlinear import simulated_with, without_each
 from gaident.remedies.plants import sampled_plants
 from gaident.remedies.position import position_gain
 from gaident.remedies.rules import resonances, rule_gains
-from gaident.remedies.search import UNSTABLE, Asked, Search, Tuned, asked_of, at_most, most_of
+from gaident.remedies.search import (
+    UNSTABLE,
+    Search,
+    Tuned,
+    asked_of,
+    at_most,
+    held_low,
+    most_of,
+    no_less_than_now,
+    step_not_known,
+)
 from gaident.results.diagnosis import Diagnosis
 from gaident.results.identification import Identification
-from gaident.results.retuning import LoopFigures, Retuning, RuleStart
+from gaident.results.retuning import Retuning, RuleStart
 from gaident.version import version
 
 __all__ = ["retune"]
@@ -143,7 +153,7 @@ def retune(
         plants, plants.responses(frequencies_of(plants, POLICY.checked_points, POLICY.checked_near)), asked.step, asked.noise
     )
     before = judge.figures(cascade_of(given))
-    asked, beyond = _no_less_than_now(asked, before) if torque_limit is None else (asked, [])
+    asked, beyond = no_less_than_now(asked, before, given) if torque_limit is None else (asked, [])
     work = _Retuning(
         linear[0], given, period, age > 0.0, Search(plants.chosen(slice(0, POLICY.tuned_drives + 1)), asked.roomier())
     )
@@ -182,8 +192,8 @@ def retune(
             *notes,
             *more,
             *beyond,
-            *_step_not_known(result, asked, step),
-            *_held_low(before, after, asked),
+            *step_not_known(result, asked, step),
+            *held_low(before, after, asked),
             *at_most(proposal, asked, most_times),
             *_of_the_covariance(len(drawn) - 1, holds),
             *_of_the_mechanism(result.model),
@@ -302,41 +312,6 @@ def _stiffness(tuned: Tuned, search: Search) -> float:
 
 def _pays(one: Tuned, other: Tuned) -> bool:
     return other.excess > 0.0 or one.worth >= other.worth + math.log(POLICY.filter_pays)
-
-
-def _no_less_than_now(asked: Asked, before: LoopFigures) -> tuple[Asked, list[Text]]:
-    """(what is asked for, a note) where a step asks for more than the controller's limit under the given gains already."""
-    now, limit = before.step_torque.value, asked.torque_limit
-    if limit is None or not limit < now < math.inf:
-        return asked, []
-    text = (
-        "Under the given gains a step of {:.3g} {rad/s} asks for {:.3g} {N m}, more than the limit of {:.3g} {N m}: the proposal "
-        "may ask for as much. torque_limit, or --torque-limit, asks for gains that stay below a limit."
-    )
-    return replace(asked, torque_limit=now), [say(text, asked.step, now, limit)]
-
-
-def _step_not_known(result: Identification | Diagnosis, asked: Asked, step: float | None) -> list[Text]:
-    """A note where a limit of the torque is of a step that nobody gave and no record shows.
-
-    A saved result has no records, and those of a position controller have the command of a position.
-    """
-    if step is not None or asked.torque_limit is None or any(r.command is not None for r in result.records):
-        return []
-    text = "No record shows the steps of a velocity command: one of {:.3g} {rad/s} is taken; give step, or --step."
-    return [say(text, asked.step)]
-
-
-def _held_low(before: LoopFigures, after: LoopFigures, asked: Asked) -> list[Text]:
-    """A note where the limit of the torque alone keeps the loop softer than it is."""
-    limit, old, new = asked.torque_limit, before.stiffness.value, after.stiffness.value
-    if limit is None or after.step_torque.value < POLICY.near_limit * limit or not 0.0 < new < old:
-        return []
-    text = (
-        "The loop becomes {:.2g} times as stiff as it is: a step of {:.3g} {rad/s} may ask for {:.3g} {N m}. A larger torque "
-        "limit, or a smaller step, allows more."
-    )
-    return [say(text, new / old, asked.step, limit)]
 
 
 def _of_the_covariance(drives: int, holds: float) -> list[Text]:

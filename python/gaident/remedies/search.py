@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import minimize
 
-from gaident.axis import Text, say
+from gaident.axis import Text, joined, say
 from gaident.checks import above_zero, real_number, size_of_drive
 from gaident.control.cascade import Cascade, cascade_of
 from gaident.control.controller import Controller
@@ -30,8 +30,20 @@ from gaident.remedies.loops import Loops, frequencies_of
 from gaident.remedies.plants import PlantResponses, Plants
 from gaident.results.diagnosis import Diagnosis
 from gaident.results.identification import Identification
+from gaident.results.retuning import LoopFigures
 
-__all__ = ["UNSTABLE", "Asked", "Search", "Tuned", "asked_of", "at_most", "most_of"]
+__all__ = [
+    "UNSTABLE",
+    "Asked",
+    "Search",
+    "Tuned",
+    "asked_of",
+    "at_most",
+    "held_low",
+    "most_of",
+    "no_less_than_now",
+    "step_not_known",
+]
 
 Vector = NDArray[np.float64]
 
@@ -260,6 +272,55 @@ def most_of(given: Controller, times: float | None) -> tuple[float, float, float
     own = cascade_of(given)
     gains = own.velocity.kp, own.velocity.ki, 0.0 if own.position is None else own.position.gain
     return tuple(factor * gain if gain > 0.0 else math.inf for gain in gains)  # type: ignore[return-value]
+
+
+def no_less_than_now(asked: Asked, before: LoopFigures, given: Controller) -> tuple[Asked, list[Text]]:
+    """(what is asked for, a note) where a step asks for more than the controller's limit under the given gains already.
+
+    Behind a limit the integral winds up, the further the larger ki is, and a position loop overshoots: these stay as they are.
+    """
+    now, limit, own = before.step_torque.value, asked.torque_limit, cascade_of(given)
+    if limit is None or not limit < now < math.inf:
+        return asked, []
+    kp, ki, place = asked.most
+    kept = []
+    if own.velocity.ki > 0.0 and own.velocity.anti_windup == "none":
+        ki, kept = min(ki, own.velocity.ki), ["ki"]
+    if own.position is not None:
+        place, kept = min(place, own.position.gain), [*kept, "the position gain"]
+    text = (
+        "Under the given gains a step of {:.3g} {rad/s} asks for {:.3g} {N m}, more than the limit of {:.3g} {N m}: the proposal "
+        "may ask for as much{}. torque_limit, or --torque-limit, asks for gains that stay below a limit."
+    )
+    stays = (
+        say(", with {} no larger than given, as the loop goes beyond its step behind a limit", joined(" and ", kept))
+        if kept
+        else ""
+    )
+    return replace(asked, torque_limit=now, most=(kp, ki, place)), [say(text, asked.step, now, limit, stays)]
+
+
+def step_not_known(result: Identification | Diagnosis, asked: Asked, step: float | None) -> list[Text]:
+    """A note where a limit of the torque is of a step that nobody gave and no record shows.
+
+    A saved result has no records, and those of a position controller have the command of a position.
+    """
+    if step is not None or asked.torque_limit is None or any(r.command is not None for r in result.records):
+        return []
+    text = "No record shows the steps of a velocity command: one of {:.3g} {rad/s} is taken; give step, or --step."
+    return [say(text, asked.step)]
+
+
+def held_low(before: LoopFigures, after: LoopFigures, asked: Asked) -> list[Text]:
+    """A note where the limit of the torque alone keeps the loop softer than it is."""
+    limit, old, new = asked.torque_limit, before.stiffness.value, after.stiffness.value
+    if limit is None or after.step_torque.value < POLICY.near_limit * limit or not 0.0 < new < POLICY.near_limit * old:
+        return []
+    text = (
+        "The loop becomes {:.2g} times as stiff as it is: a step of {:.3g} {rad/s} may ask for {:.3g} {N m}. A larger torque "
+        "limit, or a smaller step, allows more."
+    )
+    return [say(text, new / old, asked.step, limit)]
 
 
 def at_most(proposal: Cascade, asked: Asked, times: float | None) -> list[Text]:

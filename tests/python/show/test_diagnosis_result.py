@@ -401,11 +401,12 @@ def test_no_cause_is_beyond_doubt_where_something_is_left_or_a_parameter_ends_at
     for at_bound, said in ((True, words), (False, words.replace("very likely", "beyond doubt"))):
         known = {"gap": ga.Estimate(0.1, 0.01, "rad", at_bound=at_bound)}, velocity
         assert evidence_of("backlash", 412.0, (), known=known).endswith(said)
-    # A size of 1.4 deviations contradicts that it is beyond doubt; one clear parameter is enough.
-    unclear, clear = ga.Estimate(0.1, 0.07, "rad"), ga.Estimate(5.0, 0.1, "1")
-    assert evidence_of("backlash", 412.0, (), known=({"gap": unclear}, velocity)).endswith(words)
-    known = {"gap": unclear, "other": clear}, velocity
-    assert evidence_of("backlash", 412.0, (), known=known).endswith(words.replace("very likely", "beyond doubt"))
+    # A size of 1.4 deviations contradicts that it is beyond doubt, however clear an order is; one clear size is enough.
+    unclear, clear, order = (ga.Estimate(*row) for row in ((0.01, 0.007, "N m"), (0.02, 0.001, "N m"), (6.0, 0.001, "1/turn")))
+    known = {"amplitude": unclear, "order": order}, velocity
+    assert evidence_of("cogging", 412.0, (), known=known).endswith(words)
+    known = {"amplitude": clear, "order": order, "amplitude_2": unclear}, velocity
+    assert evidence_of("cogging", 412.0, (), known=known).endswith(words.replace("very likely", "beyond doubt"))
 
 
 def test_a_pair_that_does_not_swing_is_no_resonance() -> None:

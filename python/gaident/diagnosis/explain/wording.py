@@ -76,8 +76,8 @@ def evidence_of(
 
 
 def _clear(parameters: Mapping[str, Estimate]) -> bool:
-    """Whether one of an effect's parameters at least is not 0 by its deviation; an effect without any is as clear as its gain."""
-    known = [e for e in parameters.values() if e.std > 0.0]
+    """Whether one of an effect's sizes is not 0 by its deviation: of the parameters in the unit of the first one."""
+    known = [e for e in parameters.values() if e.std > 0.0 and e.unit == next(iter(parameters.values())).unit]
     return not known or any(abs(e.value) > POLICY.check_deviations * e.std for e in known)
 
 
