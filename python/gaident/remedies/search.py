@@ -290,7 +290,7 @@ def no_less_than_now(asked: Asked, before: LoopFigures, given: Controller) -> tu
         place, kept = min(place, own.position.gain), [*kept, "the position gain"]
     text = (
         "Under the given gains a step of {:.3g} {rad/s} asks for {:.3g} {N m}, more than the limit of {:.3g} {N m}: the proposal "
-        "may ask for as much{}. torque_limit, or --torque-limit, asks for gains that stay below a limit."
+        "may ask for as much{}. Ask for a limit to have gains that stay below it."
     )
     stays = (
         say(", with {} no larger than given, as the loop goes beyond its step behind a limit", joined(" and ", kept))
@@ -317,7 +317,7 @@ def held_low(before: LoopFigures, after: LoopFigures, asked: Asked) -> list[Text
     if limit is None or after.step_torque.value < POLICY.near_limit * limit or not 0.0 < new < POLICY.near_limit * old:
         return []
     text = (
-        "The loop becomes {:.2g} times as stiff as it is: a step of {:.3g} {rad/s} may ask for {:.3g} {N m}. A larger torque "
+        "The loop becomes {:.2g} times as stiff as it is: a step of {:.3g} {rad/s} may ask for {:.3g} {N m}. A larger "
         "limit, or a smaller step, allows more."
     )
     return [say(text, new / old, asked.step, limit)]

@@ -173,17 +173,17 @@ def test_a_filter_of_the_command_is_found_where_other_two_masses_leave_noise_und
 
 def test_what_explains_as_much_as_other_gains_is_their_alternative_with_the_inertia_that_comes_with_it() -> None:
     ki = Estimate(1.2, 0.01, "N m/rad")
-    beside = {"command_weight": say("a command weight (weight {:.4g}), with an inertia of {:.4g} {kg m^2}", 0.8, 2e-4)}
+    beside = {"command_weight": say("a command weight (weight {:.4g}); the {inertia} is then {:.4g} {kg m^2}", 0.8, 2e-4)}
     found = OtherGains(None, PI, {"ki": ki}, 0.0, 0.0, 90.0, None, beside).finding(PI)  # type: ignore[arg-type]
     assert found.effect == "other_gains" and found.alternatives == ("command_weight",)
-    said = "So it does with the given gains and a command weight (weight 0.8), with an inertia of 0.0002 kg m^2. Log the torque"
+    said = "So it does with the given gains and a command weight (weight 0.8); the inertia is then 0.0002 kg m^2. Log the torque"
     assert said in found.evidence
 
 
 def test_a_form_on_a_model_that_is_none_of_an_axis_is_an_alternative_without_an_inertia() -> None:
     weight = Finding("command_weight", {"weight": Estimate(0.8, 0.01, "1")}, (), 0.0, 0.0, None, say(""), place="controller")
     form = UnloggedForm(None, PI, say("a command weight"), weight, 1.0, 1.0, None, 1.0)  # type: ignore[arg-type]
-    for mechanics, said in (({}, ")"), ({"inertia": (2e-4, 2e-4)}, "), with an inertia of 0.0002 kg m^2")):
+    for mechanics, said in (({}, ")"), ({"inertia": (2e-4, 2e-4)}, "); the inertia is then 0.0002 kg m^2")):
         found = form.rivals_of_gains(10.0, lambda before, after, known=mechanics: known)  # type: ignore[misc]
         assert str(found["command_weight"]).startswith("a command weight (") and str(found["command_weight"]).endswith(said)
     assert form.rivals_of_gains(0.0, lambda before, after: {}) == {}

@@ -85,7 +85,7 @@ class UnloggedForm:
             return {}
         shown = joined(", ", (_shown(name, e) for name, e in self.finding.parameters.items()))
         both = mechanics(self.fit, self.fit).get("inertia")
-        inertia = "" if both is None else say(", with an inertia of {:.4g} {kg m^2}", both[1])
+        inertia = "" if both is None else say("; the {inertia} is then {:.4g} {kg m^2}", both[1])
         return {self.finding.effect: say("{} ({}){}", self.words, shown, inertia)}
 
 
