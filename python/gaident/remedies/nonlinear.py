@@ -86,10 +86,9 @@ class _Tried:
         top = float(np.max(np.abs(self.command)))
         return PERCENT * max(float(np.max(np.abs(self.run.velocity[: self.part]))) / top - 1.0, 0.0)
 
-    @property
-    def slow(self) -> Vector:
-        """Velocity once the slow speed should be reached."""
-        return self.run.velocity[4 * self.part :]
+    def stands(self, slow: float) -> float:
+        """Share of the time in which it stands, once the slow speed should be reached."""
+        return float(np.mean(np.abs(self.run.velocity[4 * self.part :]) < STANDS * slow))
 
 
 def simulated_with(
@@ -105,10 +104,11 @@ def simulated_with(
     # no decision: a formula: numbers that grow without end
     if not np.all(np.abs(new.run.velocity) < 1e3 * step):
         return (say("With all effects of the model the simulated loop runs away under these gains: do not use them."),)
+    old: _Tried | None
     try:
         old = _tried(model, given, period, step, after)
     except GaidentError:
-        old = new
+        old = None
     said = [*_limit_cycle(new, old, step, period), *_stick_slip(new, old, step), *_limited(new, old, model, found, period)]
     said += _wound_up(new, model, found, period)
     return tuple(said) or (say("Simulated with all effects of the model, the loop comes to rest and creeps without a stop."),)
@@ -174,44 +174,49 @@ def _trial(model: Model, controller: Controller, period: float, step: float, par
         return _Tried(command, run(model, rec, controller), part)
 
 
-def _limit_cycle(new: _Tried, old: _Tried, step: float, period: float) -> list[Text]:
+def _limit_cycle(new: _Tried, old: _Tried | None, step: float, period: float) -> list[Text]:
     if new.rests(step):
         return []
     if not new.cycles(step):
         text = "{:.3g} s after the command is back at 0 the velocity still moves by +-{:.3g} {rad/s}{}."
-        return [say(text, (new.part + new.part) * period, new.swing, _given(", under the given gains by +-{:.3g}", old.swing))]
+        return [
+            say(
+                text,
+                (new.part + new.part) * period,
+                new.swing,
+                _given(", under the given gains by +-{:.3g}", None if old is None else old.swing),
+            )
+        ]
     frequency = 0.5 * new.turns / (len(new.last) * period)
-    so_far = say("as under the given gains") if old.cycles(step) else say("which the given gains do not make")
-    text = "At rest the velocity goes on swinging by +-{:.3g} {rad/s} at about {:.3g} Hz, a limit cycle, {}."
+    so_far = "" if old is None else ", as under the given gains" if old.cycles(step) else ", which the given gains do not make"
+    text = "At rest the velocity goes on swinging by +-{:.3g} {rad/s} at about {:.3g} Hz, a limit cycle{}."
     return [say(text, new.swing, frequency, so_far)]
 
 
-def _stick_slip(new: _Tried, old: _Tried, step: float) -> list[Text]:
+def _stick_slip(new: _Tried, old: _Tried | None, step: float) -> list[Text]:
     slow = POLICY.slow_command * step
-    stands, before = (float(np.mean(np.abs(t.slow) < STANDS * slow)) for t in (new, old))
+    stands = new.stands(slow)
     if stands <= POLICY.sticks:
         return []
-    text = (
-        "At a slow command of {:.3g} {rad/s} the axis stands for {:.0f} % of the time (stick-slip), under the given gains for "
-        "{:.0f} %."
-    )
-    return [say(text, slow, 100.0 * stands, 100.0 * before)]
+    before = _given(", under the given gains for {:.0f} %", None if old is None else PERCENT * old.stands(slow))
+    text = "At a slow command of {:.3g} {rad/s} the axis stands for {:.0f} % of the time (stick-slip){}."
+    return [say(text, slow, PERCENT * stands, before)]
 
 
-def _limited(new: _Tried, old: _Tried, model: Model, found: Controller, period: float) -> list[Text]:
+def _limited(new: _Tried, old: _Tried | None, model: Model, found: Controller, period: float) -> list[Text]:
     behind = [e.parameters["limit"] for e in model.effects if e.row.place == "actuator" and "limit" in e.parameters]
     limit = min(found.limits[0], *behind, math.inf)
     samples = int(np.sum(np.abs(new.run.torque[: new.part]) >= limit * (1.0 - 1e-9)))
     if samples == 0:
         return []
     text = "A step of {:.3g} {rad/s} reaches the limit of {:.3g} {N m} for {:.3g} s; the velocity then goes {:.3g} % beyond it{}."
-    before = _given(", under the given gains {:.3g} %", old.beyond())
+    before = _given(", under the given gains {:.3g} %", None if old is None else old.beyond())
     return [say(text, float(np.max(np.abs(new.command))), limit, samples * period, new.beyond(), before)]
 
 
-def _given(text: str, value: float) -> Text | str:
-    """What is said of the given gains; nothing where the loop runs away under them."""
-    return say(text, value) if math.isfinite(value) else ""
+def _given(text: str, value: float | None) -> Text | str:
+    """What is said of the given gains; nothing where the loop runs away under them, or could not be simulated."""
+    return say(text, value) if value is not None and math.isfinite(value) else ""
 
 
 def _wound_up(new: _Tried, model: Model, found: Controller, period: float) -> list[Text]:

@@ -92,6 +92,8 @@ def retune(
         Largest torque that a step of the velocity command of the size `step` may ask for [N m].
         None: that of the controller or, where the step asks for more under the given gains, as much as under these; none where
         the controller has no limit.
+        In that second case ki, unless an anti-windup holds the integral, and the gain of a position controller are at most
+        those given.
     torque_noise : float, optional
         Largest rms of the torque that the noise of the velocity may make [N m]; None: any.
     step : float, optional

@@ -54,6 +54,7 @@ STEPPED = slice(0, 4)  # no decision: of a solver: drives whose largest torque t
 SMALLER = 0.97  # no decision: of a solver: a step towards gains that keep what was asked for
 UPPER = 90.0  # no decision: what an argument may be; deg
 DECIBELS = 40.0  # no decision: what an argument may be
+SOFTER = 0.9  # no decision: printed: of a stiffness, from which a loop that becomes softer is said to
 TOP = 0.999  # no decision: printed: of a gain as large as allowed
 AGAIN = 2  # no decision: of a solver: simplexes, each from the end of the one before, which edges stop
 TOLERANCE = 1e-3  # no decision: of a solver: ends the search; a thousandth of a gain
@@ -314,7 +315,7 @@ def step_not_known(result: Identification | Diagnosis, asked: Asked, step: float
 def held_low(before: LoopFigures, after: LoopFigures, asked: Asked) -> list[Text]:
     """A note where the limit of the torque alone keeps the loop softer than it is."""
     limit, old, new = asked.torque_limit, before.stiffness.value, after.stiffness.value
-    if limit is None or after.step_torque.value < POLICY.near_limit * limit or not 0.0 < new < POLICY.near_limit * old:
+    if limit is None or after.step_torque.value < POLICY.near_limit * limit or not 0.0 < new < SOFTER * old:
         return []
     text = (
         "The loop becomes {:.2g} times as stiff as it is: a step of {:.3g} {rad/s} may ask for {:.3g} {N m}. A larger "

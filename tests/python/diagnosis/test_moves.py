@@ -441,7 +441,8 @@ def test_dry_friction_is_tried_at_the_size_of_a_constant_torque_that_it_cannot_b
     assert "level" not in [r.effect for r in rivals_of(bench.space, found, "constant")[1]], "where records tell them apart"
     alike = {r.effect: r for r in rivals_of(bench.space, found, "constant", ["level"])[1]}
     assert alike["level"].behind == pytest.approx(0.0, abs=1e-6) and alike["level"].fit.x[-1] == pytest.approx(0.9, abs=0.02)
-    assert rivals.of_each_effect(bench.space, found, True, lambda name: ["level"], lambda message: None)[1] is not None
+    better = rivals.of_each_effect(bench.space, found, True, lambda name: ["level"], lambda message: None)[1]
+    assert better is not None and better.effects == ("level",), "it has the name"
 
 
 def test_a_rival_that_loses_its_effect_and_is_worse_takes_no_place(monkeypatch: pytest.MonkeyPatch) -> None:

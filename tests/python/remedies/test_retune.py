@@ -13,6 +13,7 @@ import pytest
 
 import gaident as ga
 from gaident.axis import said
+from gaident.remedies import nonlinear
 from gaident.remedies.doubts import doubts_of, no_gains
 from gaident.remedies.draws import age_of, drawn_models
 from gaident.remedies.loops import Loops, frequencies_of
@@ -198,6 +199,22 @@ def test_a_limit_of_which_no_record_shows_the_step_is_noted(found: ga.Diagnosis)
     for records in ((), (position,)):
         notes = ga.retune(replace(found, records=records, covariance=None), ga.PI(0.02, 0.5, torque_limit=9.0), dt=T).notes
         assert any("No record shows the steps of a velocity command: one of 1 rad/s is taken" in s for s in notes), notes
+
+
+def test_of_given_gains_that_cannot_be_simulated_nothing_is_said(tuned: ga.Retuning, monkeypatch: pytest.MonkeyPatch) -> None:
+    sticking = LAGGED.with_effect("stribeck_friction", torque=0.05, static_torque=0.4, stribeck_velocity=0.5)
+    (told,) = simulated_with(sticking, GIVEN, tuned.controller, T, 20.0, tuned.after)
+    assert "stick-slip), under the given gains for" in told
+    tried = nonlinear._tried
+
+    def refused(model: ga.Model, controller: ga.PI, *more: Any) -> Any:
+        if controller is GIVEN:
+            raise ga.GaidentError("too large")
+        return tried(model, controller, *more)
+
+    monkeypatch.setattr(nonlinear, "_tried", refused)
+    (told,) = simulated_with(sticking, GIVEN, tuned.controller, T, 20.0, tuned.after)
+    assert "stick-slip)." in told
 
 
 @pytest.mark.long
