@@ -15,11 +15,13 @@ from numpy.typing import ArrayLike, NDArray
 from gaident.checks import one_of
 from gaident.data.record_checks import (
     check_bounds,
+    check_part,
     complete,
     decimated_channels,
     digest_of,
     equally_long,
     moved_channels,
+    ranges_of,
     readable,
     sample_at,
     sample_time,
@@ -31,7 +33,7 @@ from gaident.data.record_checks import (
     torque_line,
     unwrapped,
 )
-from gaident.data.signals.arrays import MINIMUM_SAMPLES, channel
+from gaident.data.signals.arrays import channel
 from gaident.data.signals.decimation import factor_of
 from gaident.data.torque_kind import COMMANDED, SAMPLE, SMOOTH
 from gaident.errors import RecordError, check_schema
@@ -44,7 +46,7 @@ if TYPE_CHECKING:
 
 __all__ = ["CHANNELS", "Record"]
 
-CHANNELS = ("command", "velocity", "torque", "position", "position_command")
+CHANNELS = ("command", "velocity", "torque", "position", "position_command", "load_position", "load_velocity")
 """The channels of a record, in the order of its arguments."""
 
 SCHEMA = "gaident/record"
@@ -57,6 +59,7 @@ class Record:
 
     The arrays are copied once to read-only float64; yours are never changed.
     `rec[a:b]` and `rec.between` share memory with the record they were cut from; their time starts at 0 again.
+    A linear axis has m, m/s and N in the same places.
 
     Parameters
     ----------
@@ -74,6 +77,9 @@ class Record:
         What reports call the record.
     position_command : array_like, shape (n,), optional
         Position command theta* [rad], which drives a loop with a position controller.
+    load_position, load_velocity : array_like, shape (n,), optional
+        What a second encoder at the load shows, in any unit: scale (sign included) and offset are estimated. In SI rad and rad/s.
+        Where both are there the position is used. A position that wraps is continued, and `notes` says so.
     torque_is : {"commanded", "measured"}
         What the torque is.
         "commanded": as the controller issued it, before the actuator's limits, dead band, delay and lag.
@@ -89,10 +95,6 @@ class Record:
     RecordError
         NaN, infinities, unequal lengths, fewer than 20 samples, dt <= 0, arrays that are not one-dimensional real numbers,
         another `torque_is` or `torque_log`, or "measured" or "mean" without a torque.
-
-    Notes
-    -----
-    A linear axis has m, m/s and N in the same places.
 
     Examples
     --------
@@ -113,6 +115,8 @@ class Record:
     torque: NDArray[np.float64] | None
     position: NDArray[np.float64] | None
     position_command: NDArray[np.float64] | None
+    load_position: NDArray[np.float64] | None
+    load_velocity: NDArray[np.float64] | None
     name: str
     torque_is: str
     torque_log: str
@@ -128,14 +132,16 @@ class Record:
         name: str = "",
         *,
         position_command: ArrayLike | None = None,
+        load_position: ArrayLike | None = None,
+        load_velocity: ArrayLike | None = None,
         torque_is: str = COMMANDED,
         torque_log: str = SAMPLE,
         notes: Sequence[str] = (),
     ) -> None:
         complete(velocity, command, torque, position_command)
         name = readable(name)
-        given = {key: value for key, value in zip(CHANNELS, (command, velocity, torque, position, position_command), strict=True)}
-        channels = {key: None if values is None else channel(values, key) for key, values in given.items()}
+        given = (command, velocity, torque, position, position_command, load_position, load_velocity)
+        channels = {key: None if x is None else channel(x, key) for key, x in zip(CHANNELS, given, strict=True)}
         kind, line, dt = torque_kind(torque_is, channels["torque"]), torque_line(torque_log, channels["torque"]), sample_time(dt)
         said = (*texts(notes), *unwrapped(equally_long(channels), dt))
         self._fill(dt, channels, name=name, torque_is=kind, torque_log=line, notes=said)
@@ -193,7 +199,7 @@ class Record:
         kept = (COMMANDED, SAMPLE) if torque is None else (self.torque_is, self.torque_log)
         kind = kept[0] if torque_is is None else torque_kind(torque_is, torque)
         line = kept[1] if torque_log is None else torque_line(torque_log, torque)
-        notes = tuple(dict.fromkeys((*self.notes, *unwrapped(equally_long(channels), period, "position" in changed))))
+        notes = tuple(dict.fromkeys((*self.notes, *unwrapped(equally_long(channels), period, changed))))
         made._fill(period, channels, **self._about | {"torque_is": kind, "torque_log": line, "notes": notes})
         return made
 
@@ -334,12 +340,7 @@ class Record:
         return picture("plot_record", self, axis, units)
 
     def _cut(self, start: int, stop: int, text: str) -> Record:
-        count = max(stop - start, 0)
-        if count < MINIMUM_SAMPLES:
-            raise RecordError(
-                f"{text} leaves {count} samples, but at least {MINIMUM_SAMPLES} are needed; the record has "
-                f"{len(self)} samples and lasts {self.duration:g} s, choose wider bounds"
-            )
+        check_part(start, stop, text, len(self), self.duration)
         part = object.__new__(type(self))
         cut = {key: None if (v := getattr(self, key)) is None else v[start:stop] for key in CHANNELS}
         part._fill(self.dt, cut, **self._about)
@@ -383,9 +384,7 @@ class Record:
 
     def __repr__(self) -> str:
         label = f"{self.name!r}, " if self.name else ""
-        said = [word for word in (self.torque_is, self.torque_log) if word not in (COMMANDED, SAMPLE)]
-        kind = {"torque": f" ({', '.join(said)})"} if said else {}
-        channels = ", ".join(f"{key} {v.min() + 0.0:.4g}..{v.max() + 0.0:.4g}{kind.get(key, '')}" for key, v in self.channels())
+        channels = ranges_of(dict(self.channels()), self.torque_is, self.torque_log)
         return f"Record({label}{len(self)} samples, dt={self.dt:.6g} s, {self.duration:.4g} s; {channels})"
 
     def _repr_html_(self) -> str:

@@ -6,7 +6,7 @@ import hashlib
 import math
 import re
 import sys
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -23,12 +23,14 @@ from gaident.errors import RecordError
 __all__ = [
     "at_its_lines",
     "check_bounds",
+    "check_part",
     "complete",
     "decimated_channels",
     "digest_of",
     "equally_long",
     "is_held",
     "moved_channels",
+    "ranges_of",
     "saved_fields",
     "sample_at",
     "sample_time",
@@ -76,16 +78,26 @@ def equally_long(channels: dict[str, NDArray[np.float64] | None]) -> dict[str, N
     return channels
 
 
-def unwrapped(channels: dict[str, NDArray[np.float64] | None], dt: float, new: bool = True) -> tuple[str, ...]:
-    """What is said of a position that wraps, which is continued in its place among the channels; () of another one.
+def unwrapped(
+    channels: dict[str, NDArray[np.float64] | None], dt: float, changed: Collection[str] | None = None
+) -> tuple[str, ...]:
+    """What is said of positions that wrap, which are continued in their place among the channels; () where none does.
 
-    Its command goes with it: continued over its own jumps, and within half a range of the position at the first sample.
-    new: whether the position is; one of a record was looked at when that was made.
+    A position's command goes with it: continued over its own jumps, and within half a range of the position at the first sample.
+    changed: the channels that are new, None: all; a position of a record was looked at when that was made.
     Raises RecordError where an integer overflowed in another channel.
     """
-    position, command, velocity = (channels[key] for key in ("position", "position_command", "velocity"))
-    for key in ("command", "velocity", "torque") if new else ():
+    new = {key for key in channels if changed is None or key in changed}
+    for key in ("command", "velocity", "torque") if "position" in new else ():
         not_overflown(channels[key], key)
+    if "load_velocity" in new:
+        not_overflown(channels["load_velocity"], "load_velocity")
+    return (*_unwrapped_motor(channels, dt, "position" in new), *_unwrapped_load(channels, dt, "load_position" in new))
+
+
+def _unwrapped_motor(channels: dict[str, NDArray[np.float64] | None], dt: float, new: bool) -> tuple[str, ...]:
+    """See `unwrapped`, of the motor's position and its command."""
+    position, command, velocity = (channels[key] for key in ("position", "position_command", "velocity"))
     made = None if position is None or velocity is None or not new else continued(position, velocity, dt)
     if made is None:
         return ()
@@ -94,6 +106,17 @@ def unwrapped(channels: dict[str, NDArray[np.float64] | None], dt: float, new: b
     if command is not None:
         channels["position_command"] = channel(_beside(np.unwrap(command, period=period), found, period), "position_command")
     return (wrapped_words(wraps, period, Text(" rad", " m")),)
+
+
+def _unwrapped_load(channels: dict[str, NDArray[np.float64] | None], dt: float, new: bool) -> tuple[str, ...]:
+    """See `unwrapped`, of the load's position, whose unit nobody knows."""
+    position, velocity = channels["load_position"], channels["velocity"]
+    made = None if position is None or velocity is None or not new else continued(position, velocity, dt, scaled=True)
+    if made is None:
+        return ()
+    found, period, wraps = made
+    channels["load_position"] = channel(found, "load_position")
+    return (wrapped_words(wraps, period, "", "load position"),)
 
 
 def not_overflown(values: NDArray[np.float64] | None, key: str) -> None:
@@ -158,6 +181,16 @@ def check_bounds(t0: object, t1: object) -> None:
             raise RecordError(f"between(...): {key} is a whole number beyond all times; give seconds")
     if not t0 < t1:  # type: ignore[operator]  # both are numbers
         raise RecordError(f"between({t0!r}, {t1!r}): t0 must be before t1; exchange them")
+
+
+def check_part(start: int, stop: int, text: str, length: int, duration: float) -> None:
+    """Raises RecordError where a part of a record, cut by the call `text`, has too few samples."""
+    count = max(stop - start, 0)
+    if count < MINIMUM_SAMPLES:
+        raise RecordError(
+            f"{text} leaves {count} samples, but at least {MINIMUM_SAMPLES} are needed; the record has "
+            f"{length} samples and lasts {duration:g} s, choose wider bounds"
+        )
 
 
 def complete(velocity: object, command: object, torque: object, position_command: object) -> None:
@@ -230,12 +263,13 @@ def at_its_lines(means: NDArray[np.float64]) -> NDArray[np.float64]:
 
 def saved_fields(data: Mapping[str, Any], channels: Sequence[str]) -> dict[str, Any]:
     """What the constructor takes, of a saved record with these channels. Raises RecordError where a key is missing."""
-    first = ("dt", "name", *channels[:4])  # no decision: a format: its first version
+    early, more = channels[:4], channels[4:]  # no decision: a format: its first version
+    first = ("dt", "name", *early)
     missing = [key for key in first if key not in data]
     if missing:
         raise RecordError(f"the saved record lacks {', '.join(missing)}; save it again")
-    # Early files contain none of these, nor a position command.
-    later = {"torque_is": COMMANDED, "torque_log": SAMPLE, "notes": (), "position_command": None}
+    # Early files contain none of these, nor a position command or a load's channels.
+    later = {"torque_is": COMMANDED, "torque_log": SAMPLE, "notes": (), **dict.fromkeys(more)}
     return {key: data[key] for key in first} | {k: data.get(k, default) for k, default in later.items()}
 
 
@@ -253,3 +287,10 @@ def digest_of(dt: float, channels: Mapping[str, NDArray[np.float64]], torque_is:
     if torque_log != SAMPLE:
         sha.update(f" torque log {torque_log}".encode())
     return sha.hexdigest()
+
+
+def ranges_of(channels: Mapping[str, NDArray[np.float64]], torque_is: str, torque_log: str) -> str:
+    """Each channel with its lowest and its highest value, and what the torque is, on one line."""
+    said = [word for word in (torque_is, torque_log) if word not in (COMMANDED, SAMPLE)]
+    kind = {"torque": f" ({', '.join(said)})"} if said else {}
+    return ", ".join(f"{key} {v.min() + 0.0:.4g}..{v.max() + 0.0:.4g}{kind.get(key, '')}" for key, v in channels.items())

@@ -33,14 +33,19 @@ Vector = NDArray[np.float64]
 
 
 def plot_record(rec: Record, axis: str = "rotary", units: Mapping[str, str | float] | None = None) -> Figure:
-    """The channels of a record over time, velocity and position each with its command; units: the user's, see `scales_of`."""
+    """The channels of a record over time, velocity and position each with its command; units: the user's, see `scales_of`.
+
+    What a sensor at the load shows stands below what the motor's shows, on a scale of its own: its unit is not known.
+    """
     v, u, x = (unit(rotary, axis) for rotary in ("rad/s", "N m", "rad"))
     measured = " (measured)" if rec.torque_is == MEASURED else ""
     position = word("angle", axis)
     rows: list[tuple[str, float, list[tuple[Vector | None, str, str]]]] = [
         (f"velocity [{v}]", 1.6, [(rec.velocity, "measured", BLUE), (rec.command, "command", GREY)]),
+        ("load velocity", 1.0, [(rec.load_velocity, "", SKY)]),
         (f"{word('torque', axis)}{measured} [{u}]", 1.0, [(rec.torque, "", GREEN)]),
         (f"{position} [{x}]", 1.0, [(rec.position, "measured", BLUE), (rec.position_command, "command", GREY)]),
+        ("load position", 1.0, [(rec.load_position, "", SKY)]),
     ]
     rows = [(title, height, drawn) for title, height, lines in rows if (drawn := [row for row in lines if row[0] is not None])]
     fig = new_figure(8.0, 0.6 + 1.6 * sum(height for _, height, _ in rows))

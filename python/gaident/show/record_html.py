@@ -15,6 +15,7 @@ __all__ = ["record_html", "sparkline"]
 _WIDTH, _HEIGHT = 240, 28
 _CELL = 'style="text-align:right"'
 _UNITS = {"command": "rad/s", "velocity": "rad/s", "torque": "N m", "position": "rad", "position_command": "rad"}
+"""A channel of the load has any unit, which a record does not know."""
 
 
 def record_html(rec: Record) -> str:
@@ -23,7 +24,7 @@ def record_html(rec: Record) -> str:
     head = f"<div>{name}Record, {len(rec)} samples, dt {rec.dt:.6g} s, {rec.duration:.4g} s</div>"
     kind = {"torque": " (measured)"} if rec.torque_is == MEASURED else {}
     rows = "".join(
-        f"<tr><td>{key}{kind.get(key, '')}</td><td>{_UNITS[key]}</td>"
+        f"<tr><td>{key}{kind.get(key, '')}</td><td>{_UNITS.get(key, '')}</td>"
         + "".join(f"<td {_CELL}>{_number(value)}</td>" for value in (values.min(), values.max(), values.mean()))
         + f"<td>{sparkline(values)}</td></tr>"
         for key, values in rec.channels()

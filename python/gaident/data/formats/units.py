@@ -71,6 +71,9 @@ _POSITION: dict[tuple[str, ...], _Unit] = {
     ("mm",): _straight(1e-3),
     ("um",): _straight(1e-6),
 }
+_LOAD_VELOCITY = {names: unit if unit.constant is None else _Unit(1.0) for names, unit in _VELOCITY.items()}
+_LOAD_POSITION = {names: unit if unit.constant is None else _Unit(1.0) for names, unit in _POSITION.items()}
+"""The load's sensor has counts and a full scale of its own, and its scale is estimated: such values stay as they are."""
 _TORQUE: dict[tuple[str, ...], _Unit] = {
     ("N m", "newton metre", "newton meter"): _turning(1.0),
     ("mN m", "N mm"): _turning(1e-3),
@@ -119,6 +122,8 @@ _TABLES = {
     "torque": _TORQUE,
     "position": _POSITION,
     "position_command": _POSITION,
+    "load_position": _LOAD_POSITION,
+    "load_velocity": _LOAD_VELOCITY,
     "voltage": _VOLTAGE,
     "current": _CURRENT,
     "time": _TIME,
@@ -190,7 +195,7 @@ def is_any_unit(text: str) -> bool:
 def factor(quantity: str, unit: str | float, constants: Constants | None = None) -> float:
     """What a value in `unit` is multiplied by to get SI (rad, rad/s, N m, s; linear m, m/s, N).
 
-    quantity   "command", "velocity", "torque", "position", "position_command", "voltage", "current" or "time"
+    quantity   one of QUANTITIES, "velocity" for example
     unit       a spelling from the table, or the factor itself as a number (finite, not 0; negative turns the
                sign)
     constants  of the drive, for counts, A, V and %

@@ -106,25 +106,42 @@ class Unwrapper:
         return period if float(np.quantile(rest, POLICY.wrap_spared)) < POLICY.wrap_beside * period else None
 
 
-def continued(x: Vector, velocity: Vector, dt: float) -> tuple[Vector, float, int] | None:
+def continued(x: Vector, velocity: Vector, dt: float, scaled: bool = False) -> tuple[Vector, float, int] | None:
     """(a position made continuous, M, how often it wrapped) beside its velocity, sampled every dt [s]; None where nothing wraps.
 
     A jump that the velocity has too is a motion.
+    scaled: the velocity is that of another shaft: the steps without a jump say by which factor s it moves the position,
+
+        s = sum(d(n) v(n)) / sum(v(n)^2)    d(n): step from x(n) to x(n+1),  v(n) = (dt/2) (velocity(n) + velocity(n+1))
     """
     one = Unwrapper()
     with np.errstate(over="ignore", invalid="ignore"):
         found = one.push(x)
     if one.period is None:
         return None
-    at = np.flatnonzero(np.abs(np.diff(found - x)) > 0.5 * one.period)  # no decision: rounding: a whole number of periods
-    off = np.diff(found)[at] - 0.5 * dt * (velocity[at] + velocity[at + 1])
+    jumps = np.abs(np.diff(found - x)) > 0.5 * one.period  # no decision: rounding: a whole number of periods
+    moved = 0.5 * dt * (velocity[:-1] + velocity[1:])
+    if scaled:
+        moved *= _slope(moved[~jumps], np.diff(found)[~jumps])
+    off = np.diff(found)[jumps] - moved[jumps]
     return (found, one.period, one.wraps) if float(np.abs(off).max()) < POLICY.wrap_beside * one.period else None
 
 
-def wrapped_words(wraps: int, period: float, unit: str) -> Text:
-    """What was done to a position that wrapped; unit: of `period`, with a space before it, or nothing."""
+def _slope(x: Vector, y: Vector) -> float:
+    """The factor s with which s x is nearest to y; 0 where x rests."""
+    size = float(np.abs(x).max(initial=0.0))
+    if not size > 0.0:
+        return 0.0
+    return float((x / size) @ y / ((x / size) @ x))
+
+
+def wrapped_words(wraps: int, period: float, unit: str, what: str = "position") -> Text:
+    """What was done to a position that wrapped.
+
+    unit: of `period`, with a space before it, or nothing; what: the position's name.
+    """
     times = "once" if wraps == 1 else f"{wraps} times"
-    return say("The position wrapped {}, by {:.6g}{}, and was continued over these jumps.", times, period, unit)
+    return say("The {} wrapped {}, by {:.6g}{}, and was continued over these jumps.", what, times, period, unit)
 
 
 def overflow(x: Vector) -> tuple[int, float] | None:
