@@ -91,7 +91,8 @@ def quantity(text: str) -> float | str:
 
 def add_log_options(parser: argparse.ArgumentParser) -> None:
     """How logs are read."""
-    g = parser.add_argument_group("the log", "channels: command, velocity, torque, position, time")
+    channels = "command, velocity, torque, position, position_command, load_position, load_velocity, time"
+    g = parser.add_argument_group("the log", f"channels: {channels}")
     g.add_argument("--drive", metavar="FILE", help="drive.toml with what belongs to the axis; options override it")
     selected = "of a drive file with several axes, [axes.NAME], the one that is meant; gaident diagnose takes several"
     g.add_argument("--select", nargs="+", metavar="NAME", help=f"{selected} (default: all)")

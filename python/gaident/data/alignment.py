@@ -25,6 +25,7 @@ from gaident.data.signals.arrays import MINIMUM_SAMPLES, channel, positive_numbe
 from gaident.data.signals.decimation import low_passed
 from gaident.data.signals.lags import LagFit, coarse_lags, refine
 from gaident.data.signals.resampling import held_means
+from gaident.data.signals.wraps import Unwrapper
 from gaident.data.torque_kind import MEAN, SAMPLE, SMOOTH
 from gaident.errors import RecordError
 from gaident.estimation.criterion import gained
@@ -109,6 +110,7 @@ def align(
     """Bring the channels of a second log, which has a clock of its own, onto the first record's time axis.
 
     The channels taken over are low-passed where `rec` samples more slowly, then interpolated (monotone cubic).
+    Positions of a mapping that wrap are continued first, as those of a record were.
 
     Parameters
     ----------
@@ -200,6 +202,8 @@ def _channels(other: object, dt: float | None) -> tuple[dict[str, NDArray[np.flo
     if len({len(values) for values in found.values()}) != 1:
         listed = ", ".join(f"{name} {len(values)}" for name, values in found.items())
         raise RecordError(f"other: give channels of equal length ({listed or 'none is given'})")
+    for name in found.keys() & {"position", "load_position"}:  # between two sides of a jump there is nothing
+        found[name] = Unwrapper().push(found[name])
     return found, sample_time(dt, "give the sample time of other in seconds")
 
 

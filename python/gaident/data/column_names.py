@@ -9,7 +9,9 @@ from dataclasses import dataclass
 from gaident.data.column_words import (
     COMMAND_WORDS,
     FOREIGN_WORDS,
+    LOAD_SENSORS,
     MEASURED_WORDS,
+    NO_LOAD_SENSOR,
     QUANTITY_WORDS,
     UNSURE_AT_THE_END,
     UNSURE_WORDS,
@@ -17,11 +19,12 @@ from gaident.data.column_words import (
 )
 from gaident.policy.table import POLICY
 
-__all__ = ["NameSays", "name_says"]
+__all__ = ["NameSays", "load_says", "name_says"]
 
 _BETWEEN = re.compile(r"[/!]|::|\.(?!\s)")  # what separates the parts of a path
 _BRACKET = re.compile(r"\[[^\]]*\]?")  # [rad/s], [0]
 _FIELD_CURRENT = frozenset(("current", "strom"))  # beside d: the current that forms the field
+_ENCODERS = frozenset(("encoder", "geber", "lastgeber"))
 _OF_A_PATH = frozenset(("state", "field"))  # foreign as a signal's own name, not as a folder of signals
 
 
@@ -59,6 +62,30 @@ def name_says(names: Iterable[str], unit: str | None = None) -> NameSays:
     return NameSays(
         quantities, commanded, measured, any(s.foreign for s in found), unsure or any(s.unsure for s in found if s.quantities)
     )
+
+
+def load_says(names: Iterable[str], unit: str | None = None) -> Mapping[str, int]:
+    """How much speaks for a position and for a velocity that a sensor at the load measured; {} where anything leaves a doubt.
+
+    >>> [dict(load_says([name])) for name in ("Load position", "load speed actual", "Lastgeber", "Load torque", "load_pos_ref")]
+    [{'position': 4}, {'velocity': 4}, {'position': 3}, {}, {}]
+    """
+    found: dict[str, int] = {}
+    for name in names:
+        bare = _BRACKET.sub("", _without_unit(name, unit))
+        plain = {word for part in _BETWEEN.split(bare) for word in re.findall(r"[^\W\d_]+", part.casefold())}
+        words = plain | {word for part in _BETWEEN.split(bare) for word in words_of(part)}
+        marks = next((marks for marks in LOAD_SENSORS if marks <= words), frozenset[str]())
+        if not marks or words & (NO_LOAD_SENSOR | COMMAND_WORDS | UNSURE_WORDS | (FOREIGN_WORDS - {"load", "last"})):
+            continue
+        said = _quantities([word for word in words if len(word) > 1], True, False)
+        if not said and not marks.isdisjoint(_ENCODERS):
+            said = {"position": POLICY.related_points}
+        if said.get("velocity"):
+            said.pop("position", None)  # a velocity of an encoder
+        if said.keys() <= {"position", "velocity"}:
+            found = {**found, **said}
+    return found if len(found) == 1 else {}
 
 
 def _one(name: str) -> NameSays:

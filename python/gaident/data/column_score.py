@@ -4,21 +4,25 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from gaident.data.column_names import name_says
+from gaident.data.column_names import load_says, name_says
 from gaident.data.formats.units import Constants, factor, is_any_unit
 from gaident.errors import ReadError
 from gaident.policy.table import POLICY
 
-__all__ = ["COMMANDED_QUANTITY", "spoken_for"]
+__all__ = ["COMMANDED_QUANTITY", "LOAD_QUANTITY", "spoken_for"]
 
 COMMANDED_QUANTITY = {"command": "velocity", "position_command": "position"}
 """Channel that is a command -> the quantity that it commands."""
+LOAD_QUANTITY = {"load_position": "position", "load_velocity": "velocity"}
+"""Channel of a sensor at the load -> the quantity that it measures."""
 CALLED = {"torque": "torque or current"}
 """Quantity -> what a column of it may be called, where that is more."""
 
 
 def spoken_for(names: Sequence[str], unit: str | None, channel: str) -> tuple[int, str, bool]:
     """How much speaks for a column of these names and this unit (words, the unit), why, and whether the user has to be asked."""
+    if channel in LOAD_QUANTITY:
+        return _spoken_for_load(names, unit, channel)
     quantity = COMMANDED_QUANTITY.get(channel, channel)
     said = name_says(names, unit)
     by_name, fits = said.quantities.get(quantity, 0), _is_unit_of(unit, quantity)
@@ -39,6 +43,16 @@ def spoken_for(names: Sequence[str], unit: str | None, channel: str) -> tuple[in
     if channel in COMMANDED_QUANTITY and said.commanded:
         why.append("its name says that it is a command")
     return score, ", ".join(filter(None, why)), said.unsure
+
+
+def _spoken_for_load(names: Sequence[str], unit: str | None, channel: str) -> tuple[int, str, bool]:
+    """See `spoken_for`: the name has to say it, and the unit must not speak against it."""
+    quantity = LOAD_QUANTITY[channel]
+    by_name = load_says(names, unit).get(quantity, 0)
+    against = unit is not None and not _converts(unit, channel) and is_any_unit(unit)
+    if not by_name or against:
+        return 0, "", False
+    return by_name, f"its name says {quantity}, of a sensor at the load", False
 
 
 def _is_unit_of(unit: str | None, quantity: str) -> bool:

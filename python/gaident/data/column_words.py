@@ -14,7 +14,9 @@ from gaident.policy.table import POLICY
 __all__ = [
     "COMMAND_WORDS",
     "FOREIGN_WORDS",
+    "LOAD_SENSORS",
     "MEASURED_WORDS",
+    "NO_LOAD_SENSOR",
     "QUANTITY_WORDS",
     "UNSURE_AT_THE_END",
     "UNSURE_WORDS",
@@ -83,6 +85,19 @@ FOREIGN_WORDS = frozenset(
     )
 )
 """It is no channel of a record."""
+
+LOAD_SENSORS = (
+    *(frozenset((word,)) for word in ("load", "lastgeber", "lastseitig", "lastseitige", "lastseitiger")),
+    *(frozenset((word,)) for word in ("lastdrehzahl", "lastgeschwindigkeit", "lastlage")),
+    *(frozenset((which, "encoder")) for which in ("second", "secondary", "external", "ext")),
+    *(frozenset((which, "geber")) for which in ("zweiter", "externer")),
+)
+"""Words that stand together in the name of what a sensor at the load shows."""
+
+NO_LOAD_SENSOR = frozenset(
+    ("motor", "servo", "no", "angle", "winkel", "theta", "phi", "master", "leit", "brake", "cell", "without", "ohne")
+)
+"""It shows something else, or may do so: a load angle is also that of a synchronous machine."""
 
 UNSURE_WORDS = frozenset(("control", "input", "output", "limited", "ziel", "revolution"))
 """It may be commanded or measured, raw or folded: where no other word says which, nobody but the user knows."""

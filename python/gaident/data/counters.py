@@ -1,4 +1,4 @@
-"""Counters of a log that run over: a position is continued and that is said, an overflown velocity, torque or command refused."""
+"""Counters of a log that run over: positions are continued and that is said, an overflown velocity, torque or command refused."""
 
 from __future__ import annotations
 
@@ -22,8 +22,8 @@ class Counters:
 
     def __init__(self, table: LogTable, wanted: Wanted, named: Mapping[str, Column]) -> None:
         turn = wanted.constants.counts_per_turn
-        self._position = Unwrapper([] if turn is None else [turn])
-        self._column = named.get("position")
+        self._positions = {"position": Unwrapper([] if turn is None else [turn]), "load_position": Unwrapper()}
+        self._columns = {channel: named.get(channel) for channel in self._positions}
 
     def passed(self, block: LogTable, channel: str, values: Vector) -> Vector:
         """The values, those of a position continued where they wrap. Raises ReadError for an integer that overflowed."""
@@ -32,8 +32,8 @@ class Counters:
             filled = values.copy()
             filled[there] = self.passed(block, channel, values[there])
             return filled
-        if channel == "position":
-            return self._position.push(values)
+        if channel in self._positions:
+            return self._positions[channel].push(values)
         if (found := overflow(values)) is not None:
             n, period = found
             raise ReadError(
@@ -45,9 +45,10 @@ class Counters:
 
     def notes(self) -> tuple[str, ...]:
         """What was done, in the log's units."""
-        wraps, period = self._position.wraps, self._position.period
-        if not wraps or self._column is None:
-            return ()
-        unit = f" {self._column.unit}" if self._column.unit else ""
-        assert period is not None
-        return (wrapped_words(wraps, period, unit),)
+        said = []
+        for channel, one in self._positions.items():
+            column = self._columns[channel]
+            if one.wraps and one.period is not None and column is not None:
+                unit = f" {column.unit}" if column.unit else ""
+                said.append(wrapped_words(one.wraps, one.period, unit, channel.replace("_", " ")))
+        return tuple(said)

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from gaident.data.column_score import spoken_for
+from gaident.data.column_score import LOAD_QUANTITY, spoken_for
 from gaident.data.formats.units import factor
 from gaident.data.listing import ColumnInfo, Listing
 from gaident.data.record import CHANNELS
@@ -31,7 +31,10 @@ class Guess:
 
 
 def guess_channels(listing: Listing) -> Guess:
-    """The most likely column of each channel; one that nothing speaks for, or as much for several columns, is left out."""
+    """The most likely column of each channel; one that nothing speaks for, or as much for several columns, is left out.
+
+    A sensor at the load has what no other channel may have.
+    """
     usable = [c for c in listing.columns if c.samples > 1 and c.lowest is not None and c.lowest != c.highest and not c.is_time]
     longest = max((c.samples for c in usable), default=0)
     usable = [c for c in usable if c.samples == longest or c.sample_time is not None]
@@ -55,6 +58,11 @@ def guess_channels(listing: Listing) -> Guess:
             _, channels[channel], reasons[channel] = first[0]
         elif first or asked[channel]:
             undecided[channel] = (*(column for _, column, _ in first), *asked[channel])
+    doubtful = {column.name for columns in undecided.values() for column in columns}
+    for channel in LOAD_QUANTITY:
+        named = [row for row in scored[channel] if row[1].name not in doubtful | {c.name for c in channels.values()}]
+        if len(named) == 1:
+            _, channels[channel], reasons[channel] = named[0]
     order = {channel: channels[channel] for channel in CHANNELS if channel in channels}
     return Guess(order, reasons, _time(listing, longest), undecided)
 

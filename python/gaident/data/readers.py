@@ -120,8 +120,8 @@ def read(
         MAT 7.3 and HDF5 need h5py, Parquet pyarrow, TDMS nptdms, MDF asammdf:
         the extras hdf5, parquet, tdms and mdf of this package.
     columns : mapping of str to str, int or None, optional
-        Channel -> column of the file; channels are command, velocity, torque, position and time, and voltage and current, from
-        which a torque is worked out.
+        Channel -> column of the file; channels are command, velocity, torque, position, position_command, load_position,
+        load_velocity and time, and voltage and current, from which a torque is worked out.
         A column is its name (or the name without a unit: `w` for `w [rpm]`), its number '#3' or 3 (zero based), or, in MAT and
         NPZ, a column of a two-dimensional array, 'data[:,3]' (zero based).
         None: columns that bear the channels' own names. {"time": None} ignores a time column.

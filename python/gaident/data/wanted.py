@@ -9,6 +9,7 @@ from typing import Any
 
 from gaident.arguments import arg
 from gaident.checks import one_of, yes_or_no
+from gaident.data.column_score import LOAD_QUANTITY
 from gaident.data.formats.table import Column, LogTable
 from gaident.data.formats.units import QUANTITIES, Constants, factor, is_any_unit
 from gaident.data.record import CHANNELS
@@ -80,6 +81,11 @@ class Wanted:
         for channel in self.load_side:
             if channel not in CHANNELS:
                 raise ReadError(f"load_side: {channel!r} is no channel; known are {', '.join(CHANNELS)}")
+            if channel in LOAD_QUANTITY:
+                raise ReadError(
+                    f"load_side names {channel!r}, whose scale is estimated and needs no gear ratio: leave it out there, or read "
+                    f"the column as {LOAD_QUANTITY[channel]!r} where it stands for the motor's own"
+                )
         if self.gear_ratio is not None:
             positive_number(self.gear_ratio, "gear_ratio", "", "give the turns of the motor per turn of the load")
         if bool(self.load_side) != (self.gear_ratio is not None):

@@ -10,13 +10,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gaident.axis import Text, said, say, unit, word
+from gaident.data.column_score import LOAD_QUANTITY
 from gaident.data.formats.units import factor, needed_constant
 from gaident.data.guess import Guess, guess_channels, unit_from_position, unit_from_velocity
 from gaident.data.listing import Listing
 from gaident.data.timeaxis import SLOW_STEP, stamp_unit
 from gaident.data.torque_kind import kind_of_torque
-from gaident.drive.draft_lines import head_of, line_of, plain, quoted, resampling_of
-from gaident.drive.log_content import axes_of, factor_of, gaps_of, is_linear, with_content
+from gaident.drive.draft_lines import any_scale, head_of, line_of, plain, quoted, resampling_of
+from gaident.drive.log_content import axes_of, factor_of, gaps_of, kind_of_axis, with_content
 from gaident.errors import ReadError
 
 __all__ = ["DriveDraft", "draft"]
@@ -90,7 +91,7 @@ class _Draft:
         self.prefix = f"axes.{name}." if name else ""  # of the sections of one axis of several
         self.fill: list[str] = []
         self.units = {channel: column.unit for channel, column in guess.channels.items()}
-        self.axis = "linear" if any(is_linear(channel, unit) for channel, unit in self.units.items()) else "rotary"
+        self.axis = kind_of_axis(self.units)
         torque = guess.channels.get("torque")
         self.torque_is = None if torque is None else kind_of_torque((torque.name, *torque.names))
         self.gaps, usual = gaps_of(values.get(guess.time.name) if guess.time else None)
@@ -284,7 +285,9 @@ class _Draft:
         si = {channel: unit(rotary, self.axis) for channel, rotary in _SI.items()}
         for channel in self.guess.channels:
             stated = self.units[channel]
-            if stated is not None and factor_of(channel, stated) is None:
+            if channel in LOAD_QUANTITY and (stated is None or factor_of(channel, stated) is None):
+                lines.append(any_scale(channel, stated))
+            elif stated is not None and factor_of(channel, stated) is None:
                 text = f"the log says {quoted(stated)}, which is not known"
                 lines.append(self._todo(f'# {channel} = "{si[channel]}"', f"units.{channel}", text))
             elif stated is not None:

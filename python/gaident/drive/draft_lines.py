@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from gaident.data.timeaxis import even_step
 from gaident.policy.table import POLICY
 
-__all__ = ["head_of", "line_of", "plain", "quoted", "resampling_of"]
+__all__ = ["any_scale", "head_of", "line_of", "plain", "quoted", "resampling_of"]
 
 _COMMENT = 26  # no decision: printed: where comments begin
 
@@ -29,6 +29,12 @@ def head_of(log: str) -> str:
 def line_of(text: str, comment: str) -> str:
     """A line with its comment behind it."""
     return f"{text.ljust(_COMMENT - 2)}  # {comment}" if comment else text
+
+
+def any_scale(channel: str, unit: str | None) -> str:
+    """The unit of a sensor at the load that the log does not say, or that is not known."""
+    says = "the log does not say it" if unit is None else f"the log says {quoted(unit)}, which is not known"
+    return line_of(f"{channel} = 1", f"{says}; any scale, as it is estimated")
 
 
 def quoted(value: str | int) -> str:

@@ -9,13 +9,14 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from gaident.data.column_score import LOAD_QUANTITY
 from gaident.data.formats.units import Constants, factor
 from gaident.data.guess import Guess, guess_channels, position_and_velocity
 from gaident.data.listing import Listing
 from gaident.errors import ReadError
 from gaident.policy.table import POLICY
 
-__all__ = ["axes_of", "factor_of", "gaps_of", "is_linear", "with_content"]
+__all__ = ["axes_of", "factor_of", "gaps_of", "kind_of_axis", "with_content"]
 
 _OF_AN_AXIS = re.compile(r"([A-Za-z0-9_-]+)[.:/|\\]")
 """How the name of a column begins where the log contains several axes: X.n_act, axis1/torque."""
@@ -57,7 +58,8 @@ def with_content(listing: Listing, guess: Guess, values: Mapping[str, NDArray[np
     """
     if "velocity" in guess.channels:
         return guess
-    taken = {c.name for channel, c in guess.channels.items() if channel != "position"} | {guess.time.name if guess.time else ""}
+    open_ = {"position", *LOAD_QUANTITY}
+    taken = {c.name for channel, c in guess.channels.items() if channel not in open_} | {guess.time.name if guess.time else ""}
     enough = [c for c in listing.columns if c.samples > POLICY.derivative_samples]
     moving = [c for c in enough if c.lowest != c.highest and not c.note and not c.rises_evenly]
     longest = max((c.samples for c in moving), default=0)
@@ -82,7 +84,13 @@ def factor_of(channel: str, unit: str | None) -> float | None:
         return None
 
 
-def is_linear(channel: str, unit: str | None) -> bool:
+def kind_of_axis(units: Mapping[str, str | None]) -> str:
+    """ "linear" where a channel of the motor is in a unit of such an axis, else "rotary"; units: channel -> what the log says."""
+    own = ((channel, unit) for channel, unit in units.items() if channel not in LOAD_QUANTITY)
+    return "linear" if any(_is_linear(channel, unit) for channel, unit in own) else "rotary"
+
+
+def _is_linear(channel: str, unit: str | None) -> bool:
     """Whether a channel in this unit is one of a linear axis."""
     if unit is None or factor_of(channel, unit) is None:
         return False

@@ -30,6 +30,8 @@ def test_a_record_keeps_what_a_sensor_at_the_load_shows() -> None:
     assert [name for name, _ in rec.channels()] == ["velocity", "torque", "load_position", "load_velocity"]
     assert not rec.load_position.flags.writeable
     assert "load_position 1" in repr(rec) and "load_velocity -1" in repr(rec)
+    html = rec._repr_html_()
+    assert "<tr><td>load_position</td><td></td>" in html and "<tr><td>load_velocity</td><td></td>" in html
     plain = record(load_position=None, load_velocity=None)
     assert plain.load_position is None and plain.load_velocity is None
     assert "load" not in repr(plain)
@@ -154,7 +156,7 @@ def test_a_second_log_brings_the_load_along() -> None:
     w = velocity(1e-3 * np.arange(2000))
     rec = ga.Record(1e-3, command=w, velocity=w)
     later = 0.25 + 2e-3 * np.arange(800)
-    second = {"load_velocity": -0.1 * velocity(later), "load_position": 7.0 * later}
+    second = {"load_velocity": -0.1 * velocity(later), "load_position": (7.0 * later) % 1.0}
     found = ga.align(rec, second, dt=2e-3, on=("velocity", "load_velocity")).record
     assert found.load_velocity == pytest.approx(-0.1 * found.velocity, abs=1e-3)
-    assert found.load_position is not None
+    assert found.load_position == pytest.approx(7.0 * (found.time - found.time[0]) + found.load_position[0], abs=1e-3)  # type: ignore[index]

@@ -93,6 +93,11 @@ def test_a_record_is_drawn_before_anything_is_fitted() -> None:
     figure = rec.plot("linear", {"velocity": "mm/s"})
     rendered(figure)
     assert [ax.get_ylabel() for ax in figure.axes] == ["velocity [mm/s]", "force (measured) [N]", "position [m]"]
+    both = rec.with_channels(load_position=7.0 * w, load_velocity=3.0 * w).plot("rotary", {"velocity": "rpm"})
+    rendered(both)
+    titles = ["velocity [rpm]", "load velocity", "torque (measured) [N m]", "angle [rad]", "load position"]
+    assert [ax.get_ylabel() for ax in both.axes] == titles
+    assert np.asarray(both.axes[1].lines[0].get_ydata()) == pytest.approx(3.0 * w)
     (only,) = ga.Record(1e-3, velocity=w, command=w).plot().axes
     assert only.get_xlabel() == "time [s]"
     with pytest.raises(SettingsError, match="which no linear axis is measured in"):
