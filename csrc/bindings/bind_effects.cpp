@@ -249,7 +249,8 @@ private:
 using OwnList = std::vector<std::tuple<std::string, py::function, RealArray>>;
 
 py::tuple simulate_models(const PyEffectRecord& record, const std::vector<EffectModel>& models, const RealArray& initial_states,
-                          int substeps, int workers, bool all, const std::string& kernel, bool lanes, const OwnList& own) {
+                          int substeps, int workers, bool all, const std::string& kernel, bool lanes, const OwnList& own,
+                          bool load) {
     EffectJob job = record.job;
     if (substeps < 0 || substeps > max_substeps) throw std::invalid_argument("substeps: 0 (as needed) to 64");
     job.substeps = substeps;
@@ -276,10 +277,17 @@ py::tuple simulate_models(const PyEffectRecord& record, const std::vector<Effect
         for (const EffectModel& m : models)
             if (m.linear.structure.p < 1)
                 throw std::invalid_argument("poles: a model without more poles than zeros exists only in the continuous loop");
-    const std::vector<py::ssize_t> shape{static_cast<py::ssize_t>(count), static_cast<py::ssize_t>(samples)};
-    RealArray velocity(shape), torque(all ? shape : std::vector<py::ssize_t>{0, 0}),
-        angle(all ? shape : std::vector<py::ssize_t>{0, 0});
-    const EffectOutputs out{velocity.mutable_data(), all ? torque.mutable_data() : nullptr, all ? angle.mutable_data() : nullptr};
+    if (load)
+        for (const EffectModel& m : models)
+            if (!(m.linear.structure == Structure{1, 2}) ||
+                m.effects.any([](const EffectInfo& info) { return info.place == Place::plant; }))
+                throw std::invalid_argument("load: only two masses, p = 1 and q = 2, have a load");
+    const std::vector<py::ssize_t> shape{static_cast<py::ssize_t>(count), static_cast<py::ssize_t>(samples)}, none{0, 0};
+    RealArray velocity(shape), torque(all ? shape : none), angle(all ? shape : none);
+    RealArray load_velocity(load ? shape : none), load_lag(load ? shape : none);
+    const auto wanted = [](bool asked, RealArray& signal) { return asked ? signal.mutable_data() : nullptr; };
+    const EffectOutputs out{velocity.mutable_data(), wanted(all, torque), wanted(all, angle), wanted(load, load_velocity),
+                            wanted(load, load_lag)};
     if (own.empty()) {
         std::atomic<bool> stop{false};
         job.stop = &stop;
@@ -289,12 +297,13 @@ py::tuple simulate_models(const PyEffectRecord& record, const std::vector<Effect
         job.own = &effects;
         simulate_effects(job, models, starts, out);
     }
-    return py::make_tuple(velocity, torque, angle);
+    return py::make_tuple(velocity, torque, angle, load_velocity, load_lag);
 }
 
+// `shown`: "velocity", or of the load its "angle", the angle less the motor's ("lag") or the "load velocity".
 py::array simulate_values(const PyEffectRecord& record, const RealArray& values, const std::tuple<int, int, int, int>& structure,
                           const std::vector<std::string>& effects, const RealArray& initial_states, int substeps, int workers,
-                          const OwnList& own) {
+                          const OwnList& own, const std::string& shown) {
     const auto [real_poles, pole_pairs, real_zeros, zero_pairs] = structure;
     const int poles = real_poles + 2 * pole_pairs, zeros = real_zeros + 2 * zero_pairs;
     if (std::min({real_poles, pole_pairs, real_zeros, zero_pairs}) < 0 || poles > max_plant_order ||
@@ -320,7 +329,12 @@ py::array simulate_values(const PyEffectRecord& record, const RealArray& values,
         }
         check_structure(m.linear.structure, m.effects);
     }
-    return simulate_models(record, models, initial_states, substeps, workers, false, "", true, own)[0];
+    const bool load = shown != "velocity", angle = shown == "angle";
+    if (load && !angle && shown != "lag" && shown != "load velocity")
+        throw std::invalid_argument("shown: 'velocity', or of the load 'angle', 'lag' or 'load velocity'");
+    const py::tuple all = simulate_models(record, models, initial_states, substeps, workers, angle, "", true, own, load);
+    if (angle) return py::array(all[2] + all[4]);
+    return all[!load ? 0 : shown == "lag" ? 4 : 3];
 }
 
 }  // namespace
@@ -336,7 +350,8 @@ void bind_effects(py::module_& m) {
              py::arg("loop"), py::arg("velocity_feedforward") = RealArray(), py::arg("torque_feedforward") = RealArray(),
              py::arg("torque_before") = 0.0)
         .def("simulate", &simulate_models, py::arg("models"), py::arg("initial_states"), py::arg("substeps"), py::arg("workers"),
-             py::arg("all"), py::arg("kernel") = "", py::arg("lanes") = true, py::arg("own") = OwnList())
+             py::arg("all"), py::arg("kernel") = "", py::arg("lanes") = true, py::arg("own") = OwnList(), py::arg("load") = false)
         .def("simulate_values", &simulate_values, py::arg("values"), py::arg("structure"), py::arg("effects"),
-             py::arg("initial_states"), py::arg("substeps"), py::arg("workers"), py::arg("own") = OwnList());
+             py::arg("initial_states"), py::arg("substeps"), py::arg("workers"), py::arg("own") = OwnList(),
+             py::arg("shown") = "velocity");
 }

@@ -328,8 +328,11 @@ class EffectRecord:
         kernel: str = "",
         lanes: bool = True,
         own: Sequence[tuple[str, Callable[..., Any], NDArray[np.float64]]] = [],
-    ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-        """(velocity, torque, angle), models x samples; the last two empty unless `all`. substeps 0: as needed.
+        load: bool = False,
+    ) -> tuple[NDArray[np.float64], ...]:
+        """(velocity, torque, angle, load's velocity, load's angle less the motor's), models x samples.
+
+        The second and third are empty unless `all`, the last two unless `load`. substeps 0: as needed.
 
         own: effects that the core does not know, each (command, torque, friction, actuator or sensor, the two of the shaft at the
         load with @load behind; function(velocity, angle, torque, command, time, *parameters), arrays of one number per model side
@@ -344,8 +347,12 @@ class EffectRecord:
         substeps: int,
         workers: int,
         own: Sequence[tuple[str, Callable[..., Any], NDArray[np.float64]]] = [],
+        shown: str = "velocity",
     ) -> NDArray[np.float64]:
-        """Velocities of models given as rows of natural parameters and effects' parameters."""
+        """Velocities of models given as rows of natural parameters and effects' parameters.
+
+        shown: "velocity", or of the load of two masses "angle", "lag" (the angle less the motor's) or "load velocity".
+        """
 
 def decode(
     words: Sequence[int], ranges: SearchRanges, gray: bool, logarithmic: bool

@@ -104,7 +104,7 @@ struct Drive {  // SI units, rad; neutral values
     double hum = 0;            // torque in time [N m],
     double hum_frequency = 0;  // Hz
     double hum_phase = 0;
-    double turning = 0;        // share by which the load's inertia, with one mass all of it, changes with its angle
+    double turning = 0;  // share by which the load's inertia, with one mass all of it, changes with its angle
     double turning_order = 1;
     double turning_phase = 0;
     double loaded = 0;       // dry friction as a share of the torque that gravity and the load put on the axis
@@ -155,8 +155,7 @@ struct End {
     const Index speed, bristle, bent;
     const bool load;
     const bool dry = d.friction_positive != 0 || d.friction_negative != 0 || d.viscous_positive != 0 || d.viscous_negative != 0 ||
-                     d.stribeck != 0 || d.drifting != 0 || d.uneven != 0 || d.loaded != 0 ||
-                     d.walking != 0;
+                     d.stribeck != 0 || d.drifting != 0 || d.uneven != 0 || d.loaded != 0 || d.walking != 0;
     const std::vector<double> walk = d.walking != 0 ? walked(d) : std::vector<double>{};
 
     double turned(const State& x) const { return load ? x[angle] - x[twist] : x[angle]; }
@@ -296,7 +295,8 @@ private:
         }
         // J(theta) = J (1 + a cos(psi)), and the torque -J'(theta) w^2/2
         const double theta = d.J2 > 0 ? x[angle] - x[twist] : x[angle], psi = d.turning_order * theta + d.turning_phase;
-        const double share = (1 + d.turning * std::cos(psi)) * (1 + d.growing * t), bend = 0.5 * d.turning * d.turning_order * std::sin(psi);
+        const double share = (1 + d.turning * std::cos(psi)) * (1 + d.growing * t),
+                     bend = 0.5 * d.turning * d.turning_order * std::sin(psi);
         const double J1 = d.J2 > 0 ? d.J1 : d.J1 * share, J2 = d.J2 * share;
         const double outward = d.J2 > 0 ? 0 : d.J1 * (bend * x[w1] - d.growing) * x[w1];  // d(J w)/dt = J dw/dt + J' w
         dx[w1] = resting ? 0 : (g * net + stored(x) - d.D1 * x[w1] - tc + outward) / J1;
@@ -398,7 +398,7 @@ extern "C" int drive_rig_run(const Drive* drive, const Drive* load, const rig_co
                              const double* filters, int filter_count, int n, double dt, int substeps, const double* command,
                              const double* given, const double* measured, const double* velocity_noise,
                              const double* torque_noise, const double* table, double* velocity, double* torque, double* position,
-                             double* truth) {
+                             double* truth, double* load_velocity, double* load_position) {
     const Drive& d = *drive;
     Rig rig(d, *load);
     rig_controller::Controller controller(*settings, filters, filter_count, command, n, dt, d.integrator_limit, d.command_rate,
@@ -414,6 +414,8 @@ extern "C" int drive_rig_run(const Drive* drive, const Drive* load, const rig_co
         double w = d.filter > 0 ? rig.s[filtered] : rig.rippled();
         truth[i] = rig.s[w1];
         position[i] = rig.s[angle];
+        load_velocity[i] = rig.s[w2];
+        load_position[i] = rig.s[angle] - rig.s[twist];
         if (!(std::abs(truth[i]) < 1e5)) return 1;
         if (velocity_noise) w += velocity_noise[i];
         if (d.quantum > 0) w = std::round(w / d.quantum) * d.quantum;

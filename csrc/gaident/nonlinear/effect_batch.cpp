@@ -35,7 +35,7 @@ public:
             p.start = starts.empty() ? nullptr : starts[i];
             p.model = reduced(models[i], p.start != nullptr);
             if (job.loop.kind == LoopKind::servo && job.loop.servo.delay > 0.0) delay_torque(p.model, job.loop.servo.delay);
-            if (p.model.effects.bits != 0 || job.own != nullptr || job.loop.kind == LoopKind::servo)
+            if (p.model.effects.bits != 0 || job.own != nullptr || job.loop.kind == LoopKind::servo || load())
                 p.substeps = job.substeps > 0 ? job.substeps : substeps_for(p.model, job.record, job.loop, job.own != nullptr);
             if (in_pairs(p.model.effects, job.own)) p.substeps += p.substeps % 2;
         }
@@ -74,6 +74,9 @@ private:
     bool in_pairs(EffectSet effects, const OwnEffects* own) const {
         return averaged() && (effects.meets(effects_known_at_ends()) || (own != nullptr && own->at(OwnPlace::sensor)));
     }
+
+    // Whether the load's motion is asked for.
+    bool load() const { return out_.load_velocity != nullptr; }
 
     double* row(double* base, std::size_t model) const { return base == nullptr ? nullptr : base + model * samples_; }
 
@@ -143,6 +146,7 @@ private:
     }
 
     void effects(std::span<const std::size_t> group, EffectSet set, OwnEffects* own, Write write) {
+        const bool shows_load = load() && write != Write::subtract;
         const bool alone = group.size() == 1 && own == nullptr && !set.meets(effects_in_lanes_only());
         const std::size_t width = alone ? 1 : effect_lanes;
         const Planned& first = planned_[group[0]];
@@ -156,7 +160,7 @@ private:
             EffectModel model = p.model;
             model.effects = set;
             PreparedEffects c;
-            prepare_effects(model, job_.record, job_.loop, p.substeps, p.start, c, run.own_at_load);
+            prepare_effects(model, job_.record, job_.loop, p.substeps, p.start, c, run.own_at_load || shows_load);
             double flat[effect_constants];
             std::memcpy(flat, &c.constants, sizeof flat);
             for (std::size_t k = 0; k < effect_constants; ++k) constants[k * width + lane] = flat[k];
@@ -192,9 +196,12 @@ private:
 
         std::vector<double> velocity(samples_ * width), torque(out_.torque == nullptr ? 0 : samples_ * width);
         std::vector<double> angle(out_.angle == nullptr ? 0 : samples_ * width);
+        std::vector<double> load_velocity(shows_load ? samples_ * width : 0), load_lag(load_velocity);
         run.velocity = velocity.data();
         run.torque = out_.torque == nullptr ? nullptr : torque.data();
         run.angle = out_.angle == nullptr ? nullptr : angle.data();
+        run.load_velocity = shows_load ? load_velocity.data() : nullptr;
+        run.load_lag = load_lag.data();
         std::vector<double> asked(own == nullptr ? 0 : 5 * width, no_command);
         if (own != nullptr) {
             std::vector<std::size_t> models(width);
@@ -208,6 +215,9 @@ private:
         spread(group, velocity, out_.velocity, width, write);
         spread(group, torque, out_.torque, width, write);
         spread(group, angle, out_.angle, width, write);
+        if (!shows_load) return;
+        spread(group, load_velocity, out_.load_velocity, width, Write::set);
+        spread(group, load_lag, out_.load_lag, width, Write::set);
     }
 
     const EffectJob& job_;

@@ -18,6 +18,10 @@ struct EffectOutputs {
     double* velocity = nullptr;  // models x logged samples, row after row; as the sensor shows it
     double* torque = nullptr;    // as the controller issues it; may be null
     double* angle = nullptr;     // the motor's true angle; may be null
+    // The load of two masses: its velocity, and its angle less the motor's, from which it starts; in the continuous loop those of
+    // the fine loop. Both or none; other models have none.
+    double* load_velocity = nullptr;
+    double* load_lag = nullptr;
 };
 
 struct EffectJob {

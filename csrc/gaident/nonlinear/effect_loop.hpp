@@ -206,6 +206,11 @@ private:
         if (run_.velocity != nullptr) Pack<R>::store(y, run_.velocity + n * width);
         if (run_.torque != nullptr) Pack<R>::store(u, run_.torque + n * width);
         if (run_.angle != nullptr) Pack<R>::store(angle_, run_.angle + n * width);
+        if constexpr (Plant::both_ends) {
+            if (run_.load_velocity == nullptr) return;
+            Pack<R>::store(plant_.load_velocity(), run_.load_velocity + n * width);
+            Pack<R>::store(load_.twist_at_start - plant_.twist(), run_.load_lag + n * width);
+        }
     }
 
     // What the sensor measures, before it is filtered.

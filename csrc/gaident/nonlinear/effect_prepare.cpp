@@ -312,7 +312,7 @@ int substeps_for(const EffectModel& model, const EffectRecord& record, const Loo
 }
 
 void prepare_effects(const EffectModel& model, const EffectRecord& record, const Loop& loop, int substeps, const double* start,
-                     PreparedEffects& out, bool own_at_load) {
+                     PreparedEffects& out, bool both_ends) {
     const Structure s = model.linear.structure;
     if (s.p < 1) throw std::invalid_argument("poles: a model with effects needs more poles than zeros");
     const double Ts = record.sample_time, h = Ts / substeps;
@@ -320,7 +320,7 @@ void prepare_effects(const EffectModel& model, const EffectRecord& record, const
     // A change of the inertia is the load's where the mechanism has one.
     const bool inertia = model.effects.meets(effects_with(Hooks::inertia)) && s == Structure{1, 2};
     TwoMasses m{};
-    out.two_masses = model.effects.needs_two_masses() || own_at_load || inertia;
+    out.two_masses = model.effects.needs_two_masses() || both_ends || inertia;
     const bool load = out.two_masses && two_masses_of(model.linear, m);
     const double samples =
         record.input.empty() ? std::numeric_limits<double>::infinity() : static_cast<double>(record.input.size());

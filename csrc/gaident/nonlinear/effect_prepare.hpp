@@ -38,8 +38,8 @@ struct PreparedEffects {
 };
 
 // `start`: the state of the linear loop as in prepare(), null for rest. Throws std::invalid_argument for p = 0.
-// `own_at_load`: effects that the core does not know act at the load of two masses.
+// `both_ends`: the load of two masses is asked for, or effects that the core does not know act there.
 void prepare_effects(const EffectModel& model, const EffectRecord& record, const Loop& loop, int substeps, const double* start,
-                     PreparedEffects& out, bool own_at_load = false);
+                     PreparedEffects& out, bool both_ends = false);
 
 }  // namespace gaident

@@ -29,6 +29,8 @@ struct EffectRun {
     double* velocity = nullptr;
     double* torque = nullptr;
     double* angle = nullptr;
+    double* load_velocity = nullptr;  // of the load of two masses, and the next with it
+    double* load_lag = nullptr;
 
     const Effects::Tables* tables = nullptr;  // one per lane
     double* history = nullptr;                // past torques: (history_mask + 1) * width numbers

@@ -46,9 +46,10 @@ template <class R>
 template <class R>
 void run_effects(const EffectRun& run, const EffectConstants<R>& c) {
     // What a coupling remembers is a state of this plant alone, so that the others' code stays what it was.
+    // It alone tells the load's motion.
     const bool changing = run.effects.meets(effects_with(Hooks::inertia));
-    const bool at_both_ends =
-        run.effects.meets(effects_with(Hooks::load | Hooks::hysteresis)) || run.own_at_load || (run.two_masses && changing);
+    const bool at_both_ends = run.effects.meets(effects_with(Hooks::load | Hooks::hysteresis)) || run.own_at_load ||
+                              (run.two_masses && changing) || run.load_velocity != nullptr;
     if (run.loop.kind == LoopKind::servo) {
         if (at_both_ends) return run_servo_on<R, LoadedTwoMassPlant<R>>(run, c);
         if (run.two_masses) return run_servo_on<R, TwoMassPlant<R>>(run, c);

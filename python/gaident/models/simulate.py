@@ -12,7 +12,7 @@ from gaident.checks import one_of
 from gaident.control import core
 from gaident.control.controller import Controller, checked_controller
 from gaident.data.record import Record
-from gaident.errors import ModelError
+from gaident.errors import GaidentError, ModelError
 from gaident.models.model import Model
 from gaident.models.simulate_many import simulated_with_effects
 from gaident.models.simulation_input import (
@@ -41,6 +41,10 @@ class Run:
         Torque as the controller issues it [N m]; the record's torque in open loop.
     position : ndarray, shape (n,)
         The motor's true angle [rad], from the record's first position or 0.
+    load_velocity : ndarray, shape (n,), or None
+        The load's true velocity [rad/s]; None where it was not asked for.
+    load_position : ndarray, shape (n,), or None
+        The load's true angle [rad], which starts where the motor's does; None where it was not asked for.
 
     See Also
     --------
@@ -50,6 +54,8 @@ class Run:
     velocity: Signal  # rad/s, as the sensor shows it
     torque: Signal  # N m, as the controller issues it; the record's torque in the open loop
     position: Signal  # rad, the motor's true angle from the record's first position or 0
+    load_velocity: Signal | None = None  # rad/s
+    load_position: Signal | None = None  # rad
 
 
 def simulate(
@@ -106,6 +112,7 @@ def run(
     *,
     arithmetic: str = "double",
     substeps: int | None = None,
+    load: bool = False,
 ) -> Run:
     """Return the model's answer to a record: its velocity, torque and position.
 
@@ -130,18 +137,21 @@ def run(
         Or a drive's (docs/dsp.md): from rest, in the continuous loop without limits; NaN once it has left its range.
     substeps : int, optional
         Steps per sample of a model with effects, 1 to 64; None: as many as it needs.
+    load : bool
+        Whether the motion of the load is simulated, too: of two masses on a shaft, p = 1 and q = 2.
 
     Returns
     -------
     Run
-        Velocity [rad/s], torque [N m] and position [rad].
+        Velocity [rad/s], torque [N m] and position [rad], with `load` velocity and position of the load.
 
     Raises
     ------
     RecordError
         Where the record lacks the input.
     ModelError
-        For p = 0 outside the continuous loop, an initial state of the wrong length, an unknown arithmetic or wrong substeps.
+        For p = 0 outside the continuous loop, an initial state of the wrong length, an unknown arithmetic, wrong substeps, or a
+        load that the model does not have.
 
     Examples
     --------
@@ -153,13 +163,20 @@ def run(
     (1.005, 20.0)
     """
     velocity, torque, angle = _simulated(model, rec, controller, initial_state, arithmetic, substeps)
-    if angle is not None:
+    if angle is None:
+        angle = _integrated(rec, velocity)
+    if not load:
         return Run(velocity, torque, angle)
+    load_velocity, lag = _load_of(model, rec, controller, initial_state, substeps)
+    return Run(velocity, torque, angle, load_velocity, angle + lag)
+
+
+def _integrated(rec: Record, velocity: Signal) -> Signal:
+    """The angle [rad] of a velocity, by the trapezoidal rule."""
     start = 0.0 if rec.position is None else float(rec.position[0])
     with np.errstate(invalid="ignore", over="ignore"):
         steps = 0.5 * rec.dt * (velocity[1:] + velocity[:-1])
-        position = start + np.concatenate([[0.0], np.cumsum(steps)])
-    return Run(velocity, torque, position)
+        return np.asarray(start + np.concatenate([[0.0], np.cumsum(steps)]))
 
 
 def initial_state(model: AnyModel, rec: Record, controller: Controller | None = None) -> Signal:
@@ -230,21 +247,46 @@ def initial_state(model: AnyModel, rec: Record, controller: Controller | None = 
     return state
 
 
+def _start_of(plant: Model, rec: Record, controller: Controller | None, state: ArrayLike | None) -> tuple[Signal, Signal, float]:
+    """(what drives the model, its initial state, empty at rest, and the torque before the record [N m])."""
+    source, what = input_of(plant, rec, controller)
+    if state is None:
+        return source, np.zeros(0), 0.0
+    start = states_of(state, "initial_state")
+    check_start(plant, controller, start, what, before=True)
+    if controller is not None or not len(start):
+        return source, start, 0.0
+    order = plant.mechanism.order
+    return source, start[:order], float(start[order] if len(start) > order else source[0])
+
+
+def _load_of(
+    model: AnyModel, rec: Record, controller: Controller | None, state: ArrayLike | None, substeps: int | None
+) -> tuple[Signal, Signal]:
+    """(velocity [rad/s], angle less the motor's [rad]) of the load."""
+    plant = as_model(model)
+    source, start, before = _start_of(plant, rec, controller, state)
+    starts = start.reshape(1, -1) if state is not None else np.zeros((0, 0))
+    record = core_record(rec, source, controller, before)
+    try:
+        found = simulated_with_effects(record, [plant], starts, checked_substeps(substeps), 1, False, load=True)
+    except GaidentError:
+        raise
+    except ValueError:
+        raise ModelError(
+            f"load is True, but the model is {plant!r}: only two masses on a shaft, p = 1 and q = 2 without an extra resonance, "
+            "have a load; leave it out"
+        ) from None
+    return found[3][0], found[4][0]  # no decision: places
+
+
 def _simulated(
     model: AnyModel, rec: Record, controller: Controller | None, state: ArrayLike | None, arithmetic: str, substeps: int | None
 ) -> tuple[Signal, Signal, Signal | None]:
     """(velocity, torque, angle); a model without effects has no angle of its own."""
     plant = as_model(model)
     one_of(arithmetic, "arithmetic", ARITHMETICS, ModelError)
-    source, what = input_of(plant, rec, controller)
-    start = np.zeros(0) if state is None else states_of(state, "initial_state")
-    if state is not None:
-        check_start(plant, controller, start, what, before=True)
-    before = 0.0
-    if controller is None and len(start):
-        order = plant.mechanism.order
-        before = float(start[order] if len(start) > order else source[0])
-        start = start[:order]
+    source, start, before = _start_of(plant, rec, controller, state)
     steps = checked_substeps(substeps)
     if arithmetic not in ("double", "float") and not plant.effects:
         _check_drive(controller, state, arithmetic)
@@ -257,7 +299,7 @@ def _simulated(
         )
     starts = start.reshape(1, -1) if state is not None else np.zeros((0, 0))
     found = simulated_with_effects(core_record(rec, source, controller, before), [plant], starts, steps, 1, True)
-    velocity, torque, angle = (signal[0] for signal in found)
+    velocity, torque, angle = (signal[0] for signal in found[:3])  # no decision: how many signals are the motor's
     return velocity, torque, angle
 
 

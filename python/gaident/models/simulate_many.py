@@ -169,8 +169,9 @@ class LoadedRecord:
         initial_states: ArrayLike | None = None,
         substeps: int | None = None,
         workers: int = 1,
+        shown: str = "velocity",
     ) -> Signal:
-        """As `simulate_values` gives them."""
+        """As `simulate_values` gives them; shown: as the core has it, also the load's motion."""
         require_strictly_proper(structure.p, self.controller)
         table = np.ascontiguousarray(values, dtype=np.float64)
         starts = np.zeros((0, 0)) if initial_states is None else np.ascontiguousarray(initial_states, dtype=np.float64)
@@ -179,9 +180,9 @@ class LoadedRecord:
         asked = tuple(structure), names, starts, checked_substeps(substeps), workers, own
         try:
             if not own:
-                return self.core.simulate_values(built_in, *asked)
+                return self.core.simulate_values(built_in, *asked, shown)
             with np.errstate(all="ignore"):  # of the user's functions
-                return self.core.simulate_values(built_in, *asked)
+                return self.core.simulate_values(built_in, *asked, shown)
         except GaidentError:
             raise
         except ValueError as reason:
@@ -189,12 +190,12 @@ class LoadedRecord:
 
 
 def simulated_with_effects(
-    record: _core.EffectRecord, plants: Sequence[Model], starts: Signal, steps: int, workers: int, every: bool
-) -> tuple[Signal, Signal, Signal]:
-    """The core's simulation of models, those with the same user-defined effects at once."""
+    record: _core.EffectRecord, plants: Sequence[Model], starts: Signal, steps: int, workers: int, every: bool, load: bool = False
+) -> tuple[Signal, ...]:
+    """The core's simulation of models, those with the same user-defined effects at once; as `_core.EffectRecord.simulate`."""
     acting = [tuple(e.key for e in plant.own_effects()) for plant in plants]
     if not any(acting):
-        return record.simulate([plant.core() for plant in plants], starts, steps, workers, every)
+        return record.simulate([plant.core() for plant in plants], starts, steps, workers, every, load=load)
     found: list[Signal] | None = None
     for keys in dict.fromkeys(acting):
         index = [i for i, mine in enumerate(acting) if mine == keys]
@@ -204,14 +205,14 @@ def simulated_with_effects(
             own.append(_asked(key, np.array(rows, dtype=np.float64)))
         some = starts[index] if starts.size else starts
         with np.errstate(all="ignore"):
-            parts = record.simulate([plants[i].core() for i in index], some, steps, workers, every, own=own)
+            parts = record.simulate([plants[i].core() for i in index], some, steps, workers, every, own=own, load=load)
         if found is None:
             found = [np.empty((len(plants) if part.size else 0, part.shape[1])) for part in parts]
         for whole, part in zip(found, parts, strict=True):
             if part.size:
                 whole[index] = part
     assert found is not None
-    return found[0], found[1], found[2]
+    return tuple(found)
 
 
 def _is_own(key: str) -> bool:

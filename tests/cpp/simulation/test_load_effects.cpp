@@ -121,3 +121,47 @@ TEST_CASE("what makes no two masses gives undefined numbers with an effect at th
     for (const Factors<double>& g : {impossible, backwards})
         CHECK(!std::isfinite(velocity_of(job, with({g, {}}, at_load("coulomb_friction"), {0.05})).back()));
 }
+
+TEST_CASE(
+    "the load's motion: in lanes as alone, bit for bit, its angle the integral of its velocity; friction holds it exactly") {
+    std::vector<EffectModel> models;
+    for (int i = 0; i < 11; ++i) {  // more than one group of lanes, some without any effect
+        EffectModel m{table_three(1.0 + 0.01 * i), {}};
+        if (i % 3 == 1) m = with(m, effect<Backlash>, {0.01});
+        if (i % 3 == 2) m = with(m, at_load("coulomb_friction"), {0.05});
+        models.push_back(m);
+    }
+    const std::vector<double> r = staircase(400);
+    for (const LoopKind kind : {LoopKind::sampled, LoopKind::open, LoopKind::continuous, LoopKind::servo}) {
+        EffectJob job = job_of(r, kind);
+        job.substeps = 8;
+        const std::size_t n = models.size() * r.size();
+        const auto motion = [&](bool lanes) {
+            job.lanes = lanes;
+            std::vector<double> w(n), w_load(n), lag(n);
+            simulate_effects(job, models, {}, {w.data(), nullptr, nullptr, w_load.data(), lag.data()});
+            return std::vector{w, w_load, lag};
+        };
+        const auto alone = motion(false);
+        CHECK(alone == motion(true));
+        if (kind == LoopKind::continuous) continue;  // the motor's velocity there is that of the bilinear loop
+        double turned = 0.0, off = 0.0;
+        for (std::size_t k = 1; k < n; ++k) {
+            if (k % r.size() == 0) continue;
+            const auto apart = [&](std::size_t at) { return alone[1][at] - alone[0][at]; };
+            const double moved = alone[2][k] - alone[2][k - 1];
+            turned = std::max(turned, std::abs(moved));
+            off = std::max(off, std::abs(moved - 0.5 * Ts * (apart(k) + apart(k - 1))));
+        }
+        CHECK(turned > 1e-5);
+        CHECK(off < 0.1 * turned);  // the trapezoidal rule at the corners of the torque
+    }
+    std::vector<double> torque(800);
+    for (std::size_t k = 0; k < torque.size(); ++k) torque[k] = 0.03 * std::sin(0.1 * static_cast<double>(k));
+    const EffectJob job = job_of(torque, LoopKind::open);
+    const EffectModel held = with({table_three(), {}}, at_load("coulomb_friction"), {0.3});
+    std::vector<double> w(torque.size()), w_load(torque.size()), lag(torque.size());
+    simulate_effects(job, {&held, 1}, {}, {w.data(), nullptr, nullptr, w_load.data(), lag.data()});
+    CHECK(*std::max_element(w.begin(), w.end()) > 0.1);
+    for (std::size_t k = 0; k < torque.size(); ++k) CHECK(w_load[k] == 0.0);
+}

@@ -168,12 +168,29 @@ COUPLING = ("backlash", "hardening_stiffness", "hysteretic_coupling")
 
 @dataclass(frozen=True)
 class Log:
-    """Everything one run left behind, arrays (n,); `truth` is the velocity [rad/s] that no sensor saw."""
+    """Everything one run left behind, arrays (n,); `truth` is the velocity [rad/s] that no sensor saw, nor the load's motion."""
 
     velocity: Array
     torque: Array
     position: Array
     truth: Array
+    load_velocity: Array
+    load_position: Array
+
+
+@dataclass(frozen=True)
+class LoadSensor:
+    """A sensor at the load: the channel it is logged as, its white noise, scale and offset."""
+
+    channel: str
+    noise: float
+    scale: float = 1.0
+    offset: float = 0.0
+
+    def read(self, log: Log, settle: int, rng: np.random.Generator) -> dict[str, Array]:
+        """Its channel of a record, without the first `settle` lines."""
+        at_load = getattr(log, self.channel)[settle:]
+        return {self.channel: self.scale * at_load + self.offset + self.noise * rng.standard_normal(len(at_load))}
 
 
 class RanAwayError(RuntimeError):
@@ -191,7 +208,7 @@ def library() -> ctypes.CDLL:
     loaded = compiled.library(SOURCE)
     pointer = ctypes.POINTER(ctypes.c_double)
     integer = ctypes.c_int
-    loaded.drive_rig_run.argtypes = [*[pointer] * 4, integer, integer, ctypes.c_double, integer, *[pointer] * 10]
+    loaded.drive_rig_run.argtypes = [*[pointer] * 4, integer, integer, ctypes.c_double, integer, *[pointer] * 12]
     return loaded
 
 
@@ -329,7 +346,7 @@ def run_drive(
     period = plant.dt / every
     least = substeps if every == 1 else max(LEAST_SUBSTEPS, -(-substeps // every))
     drive, load, control = (np.array(list(v.values()), dtype=np.float64) for v in (values, at_load, settings))
-    out = [np.empty(n) for _ in range(4)]
+    out = [np.empty(n) for _ in dataclass_fields(Log)]
     given = [
         None if a is None else np.ascontiguousarray(a, dtype=np.float64)
         for a in (command, torque if command is None else None, measured, velocity_noise, torque_noise)
@@ -363,13 +380,14 @@ def rig(
     settle: int = 0,
     substeps: int = SUBSTEPS,
     name: str = "",
+    load_sensor: LoadSensor | None = None,
 ) -> ga.Record:
     """The log of one run: `command` as its lines have it, a position command [rad] where the drive is `placed`.
 
     Starts from rest with an empty integrator; `settle` lines at command 0 before it are not logged.
     """
     ticks = between_lines(plant, np.concatenate([np.zeros(settle), np.asarray(command, dtype=np.float64)]))
-    return log_of(plant, ticks, effects, noise, seed, torque_logged, position_logged, settle, substeps, name)
+    return log_of(plant, ticks, effects, noise, seed, torque_logged, position_logged, settle, substeps, name, load_sensor)
 
 
 def log_of(
@@ -383,6 +401,7 @@ def log_of(
     settle: int = 0,
     substeps: int = SUBSTEPS,
     name: str = "",
+    load_sensor: LoadSensor | None = None,
 ) -> ga.Record:
     """The log of one run whose command changes at the controller's clock; its first `settle` lines are not logged."""
     noise = NOISES[noise] if isinstance(noise, str) else noise
@@ -405,6 +424,7 @@ def log_of(
         torque=log.torque[settle:] if torque_logged else None,
         position=log.position[settle:] - log.position[settle] if position_logged else None,
         name=name or plant.name,
+        **({} if load_sensor is None else load_sensor.read(log, settle, rng)),
     )
 
 

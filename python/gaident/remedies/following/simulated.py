@@ -146,7 +146,7 @@ class _Loop:
         """From rest, with a torque added at each of the controller's samples [N m]."""
         none = np.zeros(len(self.command))
         loaded = core.effect_record(self.period, self.command, None, none, self.start, cascade, added=added)
-        found = simulated_with_effects(loaded, [self.model], np.zeros((0, 0)), 0, 1, True)
+        found = simulated_with_effects(loaded, [self.model], np.zeros((0, 0)), 0, 1, True)[:3]  # no decision: how many
         if not all(np.all(np.isfinite(signal)) for signal in found):
             raise GaidentError(RUNS_AWAY)
         return _Motion(*(signal[0] for signal in found))
