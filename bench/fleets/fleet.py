@@ -3,6 +3,7 @@
     python bench/fleets/fleet.py courses 400          so many simulated axis-years of each kind of course, daily logs
     python bench/fleets/fleet.py drives 6             so many simulated axes with 40 logs each, diagnosed, one of them changed
     python bench/fleets/fleet.py speed 24             so many logs one after the other, and by 1 and 2 processes
+    python bench/fleets/fleet.py speed 10000 --method identify --seconds 3.5        longer logs, identified
     python bench/fleets/fleet.py memory 3000          so many tasks that are done at once: what the parent keeps of each
 
 Figures stand in bench/README.md. --workers N bounds the processes.
@@ -34,6 +35,7 @@ from gaident.fleets.changes import Scale, shifts_of  # noqa: E402
 
 PLANT = Plant(J=3e-4, D=2e-3, kp=0.03, ki=1.9, dt=1e-3)
 COMMAND = np.repeat([60.0, -80.0, 30.0, -15.0, 45.0, -45.0], 80)
+DRAWN = 100  # logs that are simulated, of those whose speed is measured
 
 
 def followed(kind: str, seed: int) -> tuple[str, int, int, int]:
@@ -61,9 +63,16 @@ def courses(count: int, workers: int) -> None:
             print(f"{kind:12} {sum(f for _, f, _, _ in found):14} {years:11.0f} {share:>15} {median:>13}", flush=True)
 
 
+def simulated(friction: float, seed: int, command: np.ndarray = COMMAND) -> ga.Record:
+    effects = {"coulomb_friction": {"torque": friction}} if friction else {}
+    return rig(PLANT, command, effects, noise=Noise(white=0.1), seed=seed)
+
+
 def write_log(path: Path, friction: float, seed: int) -> None:
-    noise = Noise(white=0.1)
-    rec = rig(PLANT, COMMAND, {"coulomb_friction": {"torque": friction}}, noise=noise, seed=seed)
+    written(path, simulated(friction, seed))
+
+
+def written(path: Path, rec: ga.Record) -> None:
     path.parent.mkdir(parents=True, exist_ok=True)
     table = np.column_stack([rec.time, rec.command, rec.velocity, rec.torque])
     np.savetxt(path, table, delimiter=",", header="time,command,velocity,torque", comments="")
@@ -98,37 +107,53 @@ def drives(count: int, workers: int) -> None:
             print(f"{name}: {len(own)} values, deviation {100 * stds:.2f} %, scatter from log to log {100 * spread:.2f} %")
 
 
-def speed(count: int) -> None:
-    """The same logs by single calls in this process, and by ga.fleet with 1 and 2 processes; memory of the parent."""
+def speed(count: int, method: str, seconds: float) -> None:
+    """The same logs by single calls in this process, and by ga.fleet with 1 and 2 processes; memory of the parent.
+
+    Logs of so many seconds, on one core each; DRAWN of them are simulated, the others are these with more noise, no two alike.
+    At most DRAWN of them are called singly.
+    """
     controller = ga.PI(PLANT.kp, PLANT.ki)
+
+    def call(log: Path) -> object:
+        if method == "identify":
+            return ga.identify(ga.read(log), controller, workers=1)
+        return ga.diagnose(ga.read(log), controller, quick=True)
+
     with tempfile.TemporaryDirectory() as folder:
-        for k in range(count):
-            write_log(Path(folder) / "logs" / "x" / f"{k:05d}.csv", 0.05, k)
-        logs = sorted(Path(folder).glob("logs/x/*.csv"))
-        ga.diagnose(ga.read(logs[0]), controller, quick=True)
+        logs = [Path(folder) / "logs" / f"axis{k % 20:02d}" / f"{k:05d}.csv" for k in range(count)]
+        long = np.resize(COMMAND, round(seconds / PLANT.dt))
+        friction = 0.0 if method == "identify" else 0.05
+        drawn = [simulated(friction, k, long) for k in range(min(count, DRAWN))]
+        for k, log in enumerate(logs):
+            rec = drawn[k % len(drawn)]
+            more = 0.0 if k < len(drawn) else 0.01 * np.random.default_rng(k).standard_normal(len(rec))
+            written(log, rec.with_channels(velocity=rec.velocity + more))
+        call(logs[0])
         began = time.perf_counter()
-        for log in logs:
-            ga.diagnose(ga.read(log), controller, quick=True)
-        single = count / (time.perf_counter() - began)
-        print(f"single calls: {single:.3f} logs/s (searches use all processors)")
+        for log in logs[:DRAWN]:
+            call(log)
+        single = min(count, DRAWN) / (time.perf_counter() - began)
+        print(f"{count} logs of {len(long)} samples, {method}; single calls: {single:.3f} logs/s", flush=True)
         for workers in (1, 2):
-            code = f"import bench_speed as b; b.run({folder!r}, {workers})"
+            code = f"import bench_speed as b; b.run({folder!r}, {workers}, {method!r})"
             script = Path(folder) / "bench_speed.py"
             script.write_text(RUN)
             again = subprocess.run([sys.executable, "-c", code], cwd=folder, capture_output=True, text=True, check=True)
-            print(again.stdout.strip())
+            print(again.stdout.strip(), flush=True)
 
 
 RUN = f"""
 import resource, time
 import gaident as ga
 
-def run(folder, workers):
+def run(folder, workers, method):
     began = []
     def told(done, message):
         began.append(time.perf_counter())
-    found = ga.fleet(f"{{folder}}/logs/x/*.csv", ga.PI({PLANT.kp}, {PLANT.ki}), out=f"{{folder}}/{{workers}}", quick=True,
-                     workers=workers, progress=told)
+    how = dict(quick=True) if method == "diagnose" else dict()
+    found = ga.fleet(f"{{folder}}/logs/*/*.csv", ga.PI({PLANT.kp}, {PLANT.ki}), out=f"{{folder}}/{{workers}}", method=method,
+                     workers=workers, progress=told, **how)
     # From the first result on: processes that start are no work on logs.
     rate = (len(began) - 1) / (began[-1] - began[0])
     peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
@@ -162,6 +187,8 @@ def main() -> None:
     parser.add_argument("what", choices=("courses", "drives", "speed", "memory"))
     parser.add_argument("count", nargs="?", type=int, default=100)
     parser.add_argument("--workers", type=int, default=1)
+    parser.add_argument("--method", choices=("diagnose", "identify"), default="diagnose", help="of speed")
+    parser.add_argument("--seconds", type=float, default=0.48, help="of speed: length of a log")
     args = parser.parse_args()
     if args.what == "courses":
         courses(args.count, args.workers)
@@ -170,7 +197,7 @@ def main() -> None:
     elif args.what == "memory":
         memory(args.count)
     else:
-        speed(args.count)
+        speed(args.count, args.method, args.seconds)
 
 
 if __name__ == "__main__":
