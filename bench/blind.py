@@ -18,7 +18,8 @@ Every finished case is a line of the file: stop at will, start again and it goes
              (--loops, --every: only these; --effects none: only clean ones)
     ramps    the same loops under ramps that begin and end between the lines of the log, trapezoids and S-shapes in turn
     jumps    the same loops under a command that jumps between the lines of the log
-    sides    two masses, inertia ratio 0.3 to 10, multi-level, torque logged: clean, and every effect of the shaft at either end
+    sides    two masses, inertia ratio 0.3 to 10, multi-level, torque logged: clean, every effect of the shaft at either
+             end, and every effect of the coupling; with a sensor at the load where one is asked for (--load-sensor)
     ends     the same drives, dry friction of one kind at both ends at once
     orders   cogging or encoder ripple of two or three orders at once, the strongest at 0.5..2 times its typical size, multi-level
     measured no controller: a torque that was measured, with white noise of 5 and 10 % of its rms; clean, and effects at the shaft
@@ -34,7 +35,7 @@ import sys
 import time
 import zlib
 from collections.abc import Iterator
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -66,7 +67,7 @@ from drive_cases import (
     tuned,
     two_masses,
 )
-from drive_rig import AT_LOAD, COUPLING, OUTSIDE, SHAFT
+from drive_rig import AT_LOAD, COUPLING, OUTSIDE, SHAFT, LoadSensor
 from loop_cases import EVERY, LOOPS, loop_effects, loop_kind, loop_noise, loop_plant, ramp_kind
 
 NOISE_KINDS = ("white", "encoder", "coloured")
@@ -79,6 +80,7 @@ OTHER_SENSORS = {
     "differenced": {"velocity_quantisation", "velocity_filter", "velocity_ripple"},  # a differenced angle knows no such velocity
 }  # encoder -> what hides in another sensor than it
 TORQUE_NOISE = (0.05, 0.1)  # of the rms of a measured torque
+LOAD_NOISE = {"load_position": 1e-5, "load_velocity": 5e-3}  # rad, rad/s behind a gear of 10
 LEVELS = ("coulomb_friction", "stribeck_friction", "asymmetric_friction", "presliding_friction", "lugre_friction")
 AT_THE_SHAFT = ("coulomb_friction", "stribeck_friction", "asymmetric_friction", "quadratic_drag", "unbalance", "cogging")
 
@@ -100,6 +102,7 @@ class Cell:
     every: int = 1  # controller samples to a line of the log
     torque_noise: float = 0.0  # of the torque's rms: a measured torque drives the axis; 0: the controller's, as logged
     waves: int = 1  # of each effect that may have several
+    load: str = ""  # channel of a sensor at the load
 
     @property
     def key(self) -> str:
@@ -107,6 +110,7 @@ class Cell:
         loop = [self.loop, str(self.every)] if self.loop else []
         loop += [f"torque {self.torque_noise:g}"] if self.torque_noise else []
         loop += [f"waves {self.waves}"] if self.waves > 1 else []
+        loop += [self.load] if self.load else []
         parts = [self.group, *loop, "+".join(self.effects), self.kind, self.noise, f"u{self.torque:d}", factor, str(self.seed)]
         return "/".join(parts)
 
@@ -154,8 +158,8 @@ def cells(group: str, cases: int, seed: int, limits: dict[tuple[str, str], float
         elif group in ("loops", "ramps", "jumps"):
             yield from loop_cells(number, group)
         elif group == "sides":
-            for effect in ("", *(e for e in EFFECTS if e in SHAFT)):
-                for key in (effect, effect + AT_LOAD) if effect else ("",):
+            for effect in ("", *(e for e in EFFECTS if e in {*SHAFT, *COUPLING})):
+                for key in (effect, effect + AT_LOAD) if effect in SHAFT else (effect,):
                     noise = NOISE_KINDS[(number + zlib.crc32(effect.encode())) % len(NOISE_KINDS)]
                     yield Cell(group, (key,) if key else (), "multi", noise, True, number)
         elif group == "ends":
@@ -197,7 +201,9 @@ def case_of(cell: Cell) -> tuple[ga.Record, ga.Record | None, ga.PI | ga.Cascade
         return random_case(number, cell.effects, cell.kind, noise, cell.torque, cell.factor, plant, plant.placed)
     if cell.group in ("sides", "ends"):  # either end of one effect, and both, on the same drive
         rng = np.random.default_rng([cell.seed, zlib.crc32("".join(cell.effects[:1]).removesuffix(AT_LOAD).encode())])
-        return random_case(cell.seed, cell.effects, cell.kind, cell.noise, cell.torque, cell.factor, two_masses(rng))
+        sensor = LoadSensor(cell.load, LOAD_NOISE[cell.load], scale=0.1) if cell.load else None
+        drawn = cell.seed, cell.effects, cell.kind, cell.noise, cell.torque, cell.factor, two_masses(rng)
+        return random_case(*drawn, load_sensor=sensor)
     plant = next(p for p in iter(lambda: random_plant(rng), None) if p.name == cell.plant) if cell.plant else None
     drawn = (cell.seed, cell.effects, cell.kind, cell.noise, cell.torque, cell.factor, plant)
     case = random_case(*drawn, settle=cell.settle, waves=cell.waves)
@@ -304,6 +310,7 @@ def main() -> None:
     parser.add_argument("--kinds", nargs="+", choices=[*KINDS, *ANYWHERE], default=[*KINDS, *ANYWHERE])
     parser.add_argument("--loops", nargs="+", choices=list(LOOPS), default=["", *LOOPS], help="of the groups loops and ramps")
     parser.add_argument("--every", nargs="+", type=int, choices=EVERY, default=list(EVERY), help="of the groups loops and ramps")
+    parser.add_argument("--load-sensor", choices=list(LOAD_NOISE), help="a channel of the load in the groups sides and ends")
     names = [plant.name for plant in nominal_plants()]
     parser.add_argument("--plants", nargs="+", choices=names, default=names, help="of --limits")
     parser.add_argument("--limit-with", default="blind_refit:limit", metavar="MODULE:FUNCTION")
@@ -331,6 +338,9 @@ def main() -> None:
         chosen = [c for c in chosen if c.kind in options.kinds and c.key not in there]
         chosen = [c for c in chosen if not options.effects or set(c.effects or ["none"]) & set(options.effects)]
         chosen = [c for c in chosen if c.loop in options.loops and c.every in options.every]
+        if options.load_sensor:
+            chosen = [replace(c, load=options.load_sensor) for c in chosen if c.group in ("sides", "ends")]
+            chosen = [c for c in chosen if c.key not in there]
         jobs = [(run, cell, not options.no_oracle) for cell in chosen]
     work(options.out, jobs, options.workers)
     print(report(list(read(options.out).values())))

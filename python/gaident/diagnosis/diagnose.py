@@ -210,7 +210,7 @@ def diagnose(
                     continue
                 note(0.03, "once more, with another rule of the integral")
                 ruled = searched(work.driving.ruled(rule), most)
-                if ruled.confirms(work) or _explains_more(ruled, work):
+                if _confirms(ruled, work) or _explains_more(ruled, work):
                     return ruled
             return work
 
@@ -221,7 +221,7 @@ def diagnose(
             if (form := work.other_form()) is not None:
                 note(0.03, "once more, under another form of controller")
                 formed = searched(driving.formed(form), most)
-                if formed.confirms(work):
+                if _confirms(formed, work):
                     work = formed
                 else:
                     work.refused(form)
@@ -249,6 +249,7 @@ def diagnose(
                 work = given_work
                 work.accept(stands)
             work.with_joint_numbers()
+            work.beside_load()
             return _Ended(work, work.report(seed), discarded)
 
         linear = identification
@@ -330,6 +331,12 @@ class _Prepared(NamedTuple):
     def driving(self) -> Driving:
         origin = {r.digest: whole for r, whole in zip((*self.records, *self.validating), self.read, strict=True)}
         return driving_of(in_order(self.records), in_order(self.validating), self.loop, self.driven, origin)
+
+
+def _confirms(formed: Work, given: Work) -> bool:
+    """Whether a search under another form of controller leaves noise, and fewer effects, less or a better mechanism."""
+    fewer = given.doubtful or len(formed.final.effects) < len(given.final.effects)
+    return formed.leaves_noise and (fewer or not given.leaves_noise)
 
 
 def _explains_more(one: Work, given: Work) -> bool:

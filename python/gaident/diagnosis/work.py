@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from gaident.axis import Text, say
 from gaident.control.pi import bare_pi
 from gaident.data.record import Record
+from gaident.diagnosis.at_the_load import explains_load, load_numbers, load_words, with_load_sensor
 from gaident.diagnosis.check import checked as by_second_method
 from gaident.diagnosis.controller.as_read import as_read
 from gaident.diagnosis.controller.controller_place import controller_findings
@@ -51,7 +52,7 @@ from gaident.diagnosis.linear_part import linear_of_part
 from gaident.diagnosis.mechanics import base_shift, mechanics_of, moved, of_no_axis, of_the_age
 from gaident.diagnosis.note import Note
 from gaident.diagnosis.records.folded import ADVICE, folded
-from gaident.diagnosis.records.hygiene import cleaned, left_out, quantisation, unexplained
+from gaident.diagnosis.records.hygiene import cleaned, left_out, left_unexplained, quantisation
 from gaident.diagnosis.records.sizes import scales_of
 from gaident.diagnosis.selection import attribution
 from gaident.diagnosis.selection.offset import Offset, offset_of
@@ -177,14 +178,15 @@ class Work:
         self.controller_steps = [*others, *self.driving.findings]
         self.notes.append(closer_numbers(old, numbers))
 
+    def beside_load(self) -> None:
+        """The model with what a sensor at the load shows, where there is one."""
+        found = with_load_sensor(self.found, self._equivalent_here, self._say)
+        if found is not None:
+            self.take(found)
+
     def other_form(self) -> UnloggedForm | None:
         """A form of controller that explains these records better than the given one and than other gains, or None."""
         return self.form if self.form is not None and self.form.better(self.found.space.margin) else None
-
-    def confirms(self, given: Work) -> bool:
-        """Whether a search under another form of controller leaves noise, and fewer effects, less or a better mechanism."""
-        fewer = given.doubtful or len(self.final.effects) < len(given.final.effects)
-        return self.leaves_noise and (fewer or not given.leaves_noise)
 
     @property
     def leaves_noise(self) -> bool:
@@ -241,6 +243,8 @@ class Work:
                 # A noise filter removes a slow misfit completely; the free run shows it.
                 driver = self.left.strongest or "time"
                 self.notes.append(far_off(beyond))
+            if not explains_load(self.found):
+                driver = driver or self.left.strongest or "time"
             if driver is None and self.data.torque_measured and not gains.closed:
                 self.notes.append(hidden_by_torque_noise(floor))
             causes = [e for e in self.final.effects if not self._only_describes(e, driver)]
@@ -268,18 +272,13 @@ class Work:
     def _made(self, x: NDArray[np.float64]) -> Model:
         return with_effects(self.estimate.parameters.model(x), self.at_controller.effects)
 
-    def _spoiled(self) -> int:
-        """Number of outliers of the log, and of samples that the model found does not follow."""
-        of_log = np.concatenate([np.isin(np.arange(len(r)), self.driving.outliers_in(r)) for r in self.records])
-        measured = np.concatenate([r.velocity for r in self.records])
-        error = self.objective.error(self.final) + measured - self.data.velocity
-        return int(of_log.sum()) + unexplained(measured, error, np.maximum(self.objective.weight, of_log))
-
     def report(self, seed: int) -> Diagnosis:
         """Everything the user sees."""
         self.note(0.9, "measuring the gain")
         gains, driver, causes, estimates, offset, mechanics, model, check = self.judged()
-        findings = findings_of_the_record(self._spoiled(), sum(len(r) for r in self.records), self.step)
+        of_log, error = list(map(self.driving.outliers_in, self.records)), self.objective.error(self.final) - self.data.velocity
+        spoiled = left_unexplained(self.records, of_log, error, self.objective.weight)
+        findings = findings_of_the_record(spoiled, sum(len(r) for r in self.records), self.step)
         findings += [replace(f, gain=gains.of(f.effect)) for f in self.controller_steps]
         estimates, together = late_together(self.under, self.estimate, self.found.space.allowed, estimates)
         more, notes = friction_beside(self.under, self.estimate)
@@ -298,7 +297,7 @@ class Work:
             driver = driver or ("velocity" if impossible == "viscous_friction" else "past")
         real = [f for f in findings if not f.is_noise]
         answered = {*self.not_testable, *(name for f in findings for name in (f.effect, *f.alternatives))}
-        self.notes += (*together, *notes, *self.doubts)
+        self.notes += (*together, *notes, *self.doubts, *load_words(self.found))
         verdict = verdict_of(bool(real), driver is not None, bool(self.doubts) or (self.data.slower and self.driving.in_doubt))
         if driver is not None and (dropped := [e for e in self.final.effects if e not in causes]):
             shown = driver if self.left.gains[driver] > self.left.needed else None
@@ -334,6 +333,7 @@ class Work:
             line=self.left.line if driver == "time" else None,
             one_sided={e: sizes for e, sizes in self.excited.one_sided.items() if e not in answered},
             mechanics=mechanics_of(self.under, self.estimate, more),
+            load_sensor=load_numbers(self.found),
             regression=check.regression,
             regression_force_error=check.force_error,
             comparisons=check.comparisons,

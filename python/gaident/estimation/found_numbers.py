@@ -258,10 +258,8 @@ def _change(objective: Objective, hypothesis: Hypothesis, x: Vector, noise: Nois
         if data is None:
             continue
         driven = hypothesis.over(data)
-        E = objective.errors(driven, x[None, :])
-        if float(np.abs(E).max()) < LOST:
-            row = objective.whitened(E, noise, objective.inertias(driven, x[None, :]))[0] - v
-            rows.append(sign * row)
+        if float(np.abs(objective.errors(driven, x[None, :])).max()) < LOST:
+            rows.append(sign * (objective.whitened_at(driven, x, noise) - v))
             if found.covariance is None and np.array_equal(numbers_in(driven).at, found.at + sign * by):
                 break
     return max(rows, key=lambda row: float(row @ row))

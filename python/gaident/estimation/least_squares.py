@@ -104,8 +104,7 @@ def scored(objective: Objective, found: Fit) -> Fit:
 
 def _scored(objective: Objective, found: Fit) -> Fit:
     noise = objective.own_noise(found)
-    v = objective.whitened_errors(found, noise)
-    return objective.fitted(found.hypothesis, found.x, noise, float(v @ v), found.converged)
+    return objective.fitted(found.hypothesis, found.x, noise, objective.cost_under(found, noise), found.converged)
 
 
 def reestimated(objective: Objective, found: Fit, iterations: int = POLICY.short) -> Fit:

@@ -223,6 +223,20 @@ class Objective:
         rows = self.whitened(self.error(fit)[None, :], noise, self.inertias(fit.hypothesis, fit.x[None, :]))
         return np.asarray(rows[0])
 
+    def whitened_at(self, hypothesis: Hypothesis, x: Vector, noise: NoiseFilter) -> Vector:
+        """v at x, without its slopes."""
+        rows = self.whitened(self.errors(hypothesis, x[None, :]), noise, self.inertias(hypothesis, x[None, :]))
+        return np.asarray(rows[0])
+
+    def by_record(self, rows: Matrix) -> list[Matrix]:
+        """Rows over v, summed over the sensors at each sample, as (samples, rows) of each record."""
+        return np.split(rows.T, np.cumsum(self.lengths)[:-1])
+
+    def cost_under(self, fit: Fit, noise: NoiseFilter) -> float:
+        """V of a fit's x under another filter."""
+        v = self.whitened_errors(fit, noise)
+        return float(v @ v)
+
     def whitened(self, E: Matrix, noise: NoiseFilter, inertias: Vector | None = None) -> Matrix:
         """Rows of whitened errors, of models with these inertias [kg m^2]; samples that do not count are 0."""
         V = noise.of(self.family.prefiltered(self.bridged(E), self.lengths, inertias), self.lengths)
@@ -357,6 +371,14 @@ class Objective:
     def rescored(self, fit: Fit) -> Fit:
         """A fit of the same cost under a family of other information."""
         return self.fitted(fit.hypothesis, fit.x, fit.noise, fit.cost, fit.converged)
+
+    def of_the_motor(self, fit: Fit) -> tuple[Objective, Fit]:
+        """The objective whose errors are those of the motor alone, and a fit there."""
+        return self, fit
+
+    def under_beside(self, family: NoiseFamily, fit: Fit) -> Objective:
+        """The same data, weights and sensors under another noise family; fit: by whose errors sensors are weighed."""
+        return self.under(family)
 
     def under(self, family: NoiseFamily) -> Objective:
         """The same data and weights under another noise family."""

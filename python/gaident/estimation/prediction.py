@@ -9,13 +9,16 @@ The closed loop keeps a simulation near the record: motion in a gap is so sensit
 simulated in open loop, departs from it.
 
 The angle that effects depend on is the logged one (or the measured velocity, integrated), or that of the simulation itself.
+
+`shown` says what of a simulation is given: the "velocity" that the sensor shows.
+Of the load of two masses it is the "angle" [rad], the "lag", the angle less the motor's, or the "load velocity" [rad/s].
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -90,13 +93,14 @@ class OpenLoop:
 
     data: DataSet
     own_angle: bool = False
+    shown: str = "velocity"
     closed = False
 
     def velocities(self, parameters: Parameterisation, X: Matrix) -> Matrix:
         """See `Predictor`."""
         inside = [t for t in parameters.terms if t.in_controller]
         if not all(t.replayable for t in inside) or (inside and self.data.slower):
-            return ClosedLoop(self.data, self.own_angle).velocities(parameters, X)
+            return ClosedLoop(self.data, self.own_angle, self.shown).velocities(parameters, X)
         if inside:
             return self._replayed(parameters, X, inside)
         return self._under(parameters, X, self.data.free if self.own_angle else self.data.driven)
@@ -104,9 +108,9 @@ class OpenLoop:
     def _under(self, parameters: Parameterisation, X: Matrix, records: Sequence[Record], left_out: Sequence[str] = ()) -> Matrix:
         """Rows of x under the torques of these records; left_out: effects that the torques contain already."""
         if not self.own_angle and _bends_the_angle(self.data, parameters):
-            return np.vstack([_of_true_angle(self.data, parameters, x, records, None, left_out) for x in X])
+            return np.vstack([_of_true_angle(self, parameters, x, records, None, left_out) for x in X])
         names, values = parameters.values(X, left_out)
-        return _simulated(self.data, parameters, X, names, values, records)
+        return _simulated(self, parameters, X, names, values, records)
 
     def _replayed(self, parameters: Parameterisation, X: Matrix, inside: Sequence[Term]) -> Matrix:
         """With effects of the controller the torque itself depends on x: rows that share it are simulated together."""
@@ -136,6 +140,7 @@ class ClosedLoop:
 
     data: DataSet
     own_angle: bool = False
+    shown: str = "velocity"
     closed = True
 
     def velocities(self, parameters: Parameterisation, X: Matrix) -> Matrix:
@@ -143,7 +148,7 @@ class ClosedLoop:
         data = self.data
         inside = any(t.in_controller for t in parameters.terms)
         if not inside and not self.own_angle and _bends_the_angle(data, parameters):
-            return np.vstack([_of_true_angle(data, parameters, x, data.turned, data.loop) for x in X])
+            return np.vstack([_of_true_angle(self, parameters, x, data.turned, data.loop) for x in X])
         names, values = parameters.values(X)
         steps = substeps(data, parameters.terms, data.loop)
         records = data.records if self.own_angle else data.turned
@@ -151,7 +156,7 @@ class ClosedLoop:
         starts = [parameters.standing(len(X), stored) for stored in data.stored]
         return _side_by_side(
             [
-                r.velocities(parameters.structure, names, values, initial_states=start, substeps=steps)
+                r.velocities(parameters.structure, names, values, initial_states=start, substeps=steps, shown=self.shown)
                 for r, start in zip(loaded, starts, strict=True)
             ]
         )
@@ -186,6 +191,7 @@ class ObserverLoop:
 
     data: DataSet
     own_angle: bool = False
+    shown: str = "velocity"
     closed = True
 
     def velocities(self, parameters: Parameterisation, X: Matrix) -> Matrix:
@@ -207,7 +213,7 @@ class ObserverLoop:
 
     def _loop(self, parameters: Parameterisation) -> ClosedLoop:
         inside = any(t.in_controller for t in parameters.terms)
-        return ClosedLoop(self.data if inside else self.data.observed, self.own_angle)
+        return ClosedLoop(self.data if inside else self.data.observed, self.own_angle, self.shown)
 
 
 def substeps(data: DataSet, terms: Sequence[Term], controller: Controller | None) -> int | None:
@@ -218,7 +224,7 @@ def substeps(data: DataSet, terms: Sequence[Term], controller: Controller | None
 
 
 def _simulated(
-    data: DataSet,
+    predictor: OpenLoop,
     parameters: Parameterisation,
     X: Matrix,
     names: tuple[str, ...],
@@ -226,12 +232,22 @@ def _simulated(
     records: Sequence[Record],
 ) -> Matrix:
     """Rows of x under the torques of the records, as the sensor shows the velocity."""
+    data, shown = predictor.data, predictor.shown
     steps = data.steps_of(substeps(data, parameters.terms, None))
     parts = [
-        r.velocities(parameters.structure, names, values, initial_states=parameters.start_values(X, i), substeps=steps)
+        r.velocities(
+            parameters.structure, names, values, initial_states=parameters.start_values(X, i), substeps=steps, shown=shown
+        )
         for i, r in enumerate(data.loaded(records, None))
     ]
-    return _side_by_side([data.seen(part) for part in parts])
+    return _side_by_side([_seen(predictor, part) for part in parts])
+
+
+def _seen(predictor: OpenLoop | ClosedLoop, rows: Matrix) -> Matrix:
+    """See `DataSet.seen`; of the load, what stands on the lines of the log."""
+    if predictor.shown == "velocity":
+        return predictor.data.seen(rows)
+    return rows[:, ::2] if predictor.data.differenced else rows
 
 
 def _side_by_side(parts: Sequence[Matrix]) -> Matrix:
@@ -248,7 +264,7 @@ def _bends_the_angle(data: DataSet, parameters: Parameterisation) -> bool:
 
 
 def _of_true_angle(
-    data: DataSet,
+    predictor: OpenLoop | ClosedLoop,
     parameters: Parameterisation,
     x: Vector,
     records: Sequence[Record],
@@ -256,6 +272,7 @@ def _of_true_angle(
     left_out: Sequence[str] = (),
 ) -> Matrix:
     """One x with the true angle, from which the sensor of this model makes the angle that was seen."""
+    data = predictor.data
     names, values = parameters.values(x[None, :], left_out)
     # Back through the sensor: what stands last in the chain is taken back first.
     bending = sorted((t for t in parameters.terms if t.seen_angle), key=lambda t: -place_of(t.name))
@@ -272,8 +289,9 @@ def _of_true_angle(
         else:
             run, states = loaded.turned(data.ready_angle(angle, i)), parameters.start_values(x[None, :], i)
             taken = data.steps_of(steps)
-        seen = run.velocities(parameters.structure, names, values, initial_states=states, substeps=taken)
-        parts.append(seen if controller is not None else data.seen(seen))
+        known: dict[str, Any] = dict(initial_states=states, substeps=taken, shown=predictor.shown)
+        seen = run.velocities(parameters.structure, names, values, **known)
+        parts.append(seen if controller is not None else _seen(predictor, seen))
     return np.concatenate(parts, axis=1)
 
 

@@ -144,7 +144,7 @@ def _at_one_point(objective: Objective, fit: Fit, v: Vector, J: Matrix) -> Matri
     cov, seen = np.diag(np.where(fit.parameters.steps() > 0.0, np.inf, 0.0)), seen_in(fit, J)
     if len(seen):
         inverse = inverse_of(J[seen] @ J[seen].T)
-        scores = np.split((J[seen] * v).T, np.cumsum(objective.lengths)[:-1])
+        scores = objective.by_record(J[seen] * v)
         robust = inverse @ np.sum([long_run(s) for s in scores], axis=0) @ inverse
         cov[np.ix_(seen, seen)] = larger_of(variance_of(objective, fit, v) * inverse, robust)
     return cov

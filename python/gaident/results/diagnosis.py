@@ -112,6 +112,9 @@ class Diagnosis(WhatIf):
         Effect that was tested and not found -> which sizes of it would not have shown in these records.
     mechanics : mapping of str to Estimate
         Mechanical parameters of the linear part, fitted together with the effects.
+    load_sensor : mapping of str to Estimate
+        How a sensor at the load reads it: "scale" of its signal over the load's motion, in SI where the record is, and "offset",
+        of the first record where there are several; {} without one.
     not_there : mapping of str to Bound
         Effect that was tested and not found -> how large it may be at most; {} where something significant is left, in files of
         gaident 0.1.0, and of more than 65 536 samples.
@@ -180,6 +183,7 @@ class Diagnosis(WhatIf):
     line: tuple[float, float] | None = None
     one_sided: Mapping[str, str] = field(default_factory=dict, hash=False)
     mechanics: Mapping[str, Estimate] = field(default_factory=dict, hash=False)
+    load_sensor: Mapping[str, Estimate] = field(default_factory=dict, hash=False)
     velocity_age: float = 0.0
     log_shifts: Mapping[str, Mapping[str, int]] = field(default_factory=dict, hash=False)
     regression: InverseDynamics | None = None
@@ -325,6 +329,7 @@ class Diagnosis(WhatIf):
             "expected": {name: list(of) for name, of in self.expected.items()},
             "log_shifts": {digest: dict(moves) for digest, moves in self.log_shifts.items()},
             "mechanics": {n: asdict(e) for n, e in self.mechanics.items()},
+            "load_sensor": {n: asdict(e) for n, e in self.load_sensor.items()},
             "comparisons": [asdict(c) for c in self.comparisons],
             "force_reason": self.force_reason,
             "controller_numbers": {name: asdict(e) for name, e in self.controller_numbers.items()},
@@ -373,6 +378,7 @@ class Diagnosis(WhatIf):
                 log_shifts=data.get("log_shifts", {}),
                 one_sided={effect: restored(sizes, linear) for effect, sizes in data.get("one_sided", {}).items()},
                 mechanics={n: Estimate(**e) for n, e in data.get("mechanics", {}).items()},
+                load_sensor={n: Estimate(**e) for n, e in data.get("load_sensor", {}).items()},
                 regression=None if data.get("regression") is None else InverseDynamics.from_dict(data["regression"]),
                 comparisons=tuple(map(Comparison.from_dict, data.get("comparisons", ()))),
                 force_reason=restored(data.get("force_reason", ""), linear),

@@ -99,6 +99,7 @@ def diagnosis_summary(dia: Diagnosis, axis: str = "rotary", units: Mapping[str, 
         _second_method(dia, axis, scales),
         _next(dia, axis),
         _mechanics(dia, axis, scales),
+        _load_sensor(dia, axis),
         controller_lines(dia.controller_numbers, axis),
         _base(dia, axis),
         _record(dia, axis),
@@ -274,6 +275,12 @@ def _mechanics(dia: Diagnosis, axis: str, scales: Scales) -> list[str]:
     if not {"resonance", "ground_resonance"} & dia.mechanics.keys() and len(dia.model.poles) > 1:
         lines.append(f"  {_other_pair(dia.model)}")
     return lines
+
+
+def _load_sensor(dia: Diagnosis, axis: str) -> list[str]:
+    """How a sensor at the load reads it."""
+    rows = [(name, with_std(e.value, e.std), "" if e.unit == "1" else unit(e.unit, axis)) for name, e in dia.load_sensor.items()]
+    return ["Load sensor: its signal over the motion of the load", *table(rows)] if rows else []
 
 
 def _other_pair(model: Model) -> str:

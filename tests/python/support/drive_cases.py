@@ -14,7 +14,7 @@ from itertools import pairwise
 import numpy as np
 
 import gaident as ga
-from drive_rig import AT_LOAD, COUPLING, NOISES, Array, Noise, Plant, RanAwayError, between_lines, log_of, run_drive
+from drive_rig import AT_LOAD, COUPLING, NOISES, Array, LoadSensor, Noise, Plant, RanAwayError, between_lines, log_of, run_drive
 
 __all__ = [
     "ANYWHERE",
@@ -404,10 +404,11 @@ def random_case(
     position_logged: bool = False,
     settle: int = 0,
     waves: int = 1,
+    load_sensor: LoadSensor | None = None,
 ) -> tuple[ga.Record, ga.Record | None, ga.PI | ga.Cascade, Truth]:
     """Draw record, validation record (None for a single step), controller and truth; arguments as in `random_truth`."""
     truth = random_truth(seed, effect, kind, noise, factor, plant, settle, waves)
-    return *records(truth, torque_logged, position_logged), truth.plant.controller, truth
+    return *records(truth, torque_logged, position_logged, load_sensor), truth.plant.controller, truth
 
 
 def random_truth(
@@ -454,12 +455,15 @@ def random_truth(
     raise RuntimeError(f"no drive found on which {effects} acts in a {kind} record at factor {factor}")
 
 
-def records(truth: Truth, torque_logged: bool = True, position_logged: bool = False) -> tuple[ga.Record, ga.Record | None]:
+def records(
+    truth: Truth, torque_logged: bool = True, position_logged: bool = False, load_sensor: LoadSensor | None = None
+) -> tuple[ga.Record, ga.Record | None]:
     """The log and, with other noise, the validation log of a case."""
     before = np.zeros(truth.settle * truth.plant.log_every)
     logs = [
         log_of(truth.plant, np.concatenate([before, command]), truth.effects, truth.noise, seed=2 * truth.seed + i,
-               torque_logged=torque_logged, position_logged=position_logged, settle=truth.settle, name=name)
+               torque_logged=torque_logged, position_logged=position_logged, settle=truth.settle, name=name,
+               load_sensor=load_sensor)
         for i, (command, name) in enumerate([(truth.command, truth.kind), (truth.validation_command, "validation")])
         if command is not None
     ]  # fmt: skip

@@ -51,6 +51,8 @@ __all__ = ["Aligned", "aligned"]
 
 Vector = NDArray[np.float64]
 
+BESIDE = ("position", "load_position", "load_velocity")
+"""What stands beside the velocity in a log."""
 REFUTED = say("the given controller does not make this {torque}, and without it")
 SHARES = (0.0, 0.5, -0.5)  # no decision: a formula: the rules of differencing that exist
 """Of ki dt, by which the newest error counts more than half: trapezoidal and rectangular integrals."""
@@ -190,12 +192,12 @@ def _older(x: Vector, k: int) -> Vector:
 
 
 def _moves(rec: Record, a: int, b: int) -> dict[str, int]:
-    """Channel -> samples by which it is moved, as few channels as possible; a position stays beside its velocity."""
+    """Channel -> samples by which it is moved, as few channels as possible; positions and the load stay beside the velocity."""
     if a == b:
         return {"torque": -b}
     moves = {"command": a} if a else {}
     if b:
-        moves |= {"velocity": b} | ({"position": b} if rec.position is not None else {})
+        moves |= {"velocity": b} | {name: b for name, _ in rec.channels() if name in BESIDE}
     return moves
 
 
@@ -208,7 +210,7 @@ def _moved_note(moves: Mapping[str, int], b: int, lag: TorqueLag | None) -> Text
     late = [
         say("the {} {} {}", called(name), _samples(k), "late" if k < 0 else "early")
         for name, k in moves.items()
-        if name != "position"
+        if name not in BESIDE
     ]
     done = ", ".join(f"{name} by {k:+d}" for name, k in moves.items())
     text = say(

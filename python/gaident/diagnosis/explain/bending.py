@@ -88,7 +88,7 @@ def relevance_of(
     mechanics: Mapping[str, Estimate],
 ) -> Relevance:
     """What is left beyond the noise, and what it bends; floor: what noise leaves of the free run [rad/s]."""
-    bent = _bent_by(driver, left, objective, fit, mechanics)
+    bent = _bent_by(driver, left, *objective.of_the_motor(fit), mechanics)
     torque = None
     if after.force_error is not None and after.force_floor is not None:
         torque = _beyond(after.force_error, after.force_floor)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -106,6 +108,16 @@ def cleaned(rec: Record, hit: NDArray[np.intp]) -> Record:
     w = rec.velocity.copy()
     _interpolate(w, hit)
     return rec.with_channels(velocity=w)
+
+
+def left_unexplained(records: Sequence[Record], of_log: Sequence[NDArray[np.intp]], missing: Vector, weight: Vector) -> int:
+    """Number of outliers of the log, and of samples that the model found does not follow.
+
+    of_log: outliers of each record. missing: minus the velocity of the model (n,). weight (n,): 0 where samples were left out.
+    """
+    hit = np.concatenate([np.isin(np.arange(len(r)), own) for r, own in zip(records, of_log, strict=True)])
+    measured = np.concatenate([r.velocity for r in records])
+    return int(hit.sum()) + unexplained(measured, missing + measured, np.maximum(weight, hit))
 
 
 def unexplained(velocity: Vector, error: Vector, weight: Vector) -> int:

@@ -18,7 +18,7 @@ from gaident.diagnosis.selection.moves import MISSED, Moves
 from gaident.diagnosis.selection.screening.score_test import ScoreTest
 from gaident.errors import GaidentError, RecordError, SettingsError
 from gaident.estimation import least_squares as ls
-from gaident.estimation.criterion import effective_samples, gained
+from gaident.estimation.criterion import Specification, chi_square_bound, effective_samples, gained, specification_statistic
 from gaident.estimation.dataset import DataSet
 from gaident.estimation.noise_model import WHITE, ShaftNoise
 from gaident.estimation.objective import Fit, Hypothesis, Innovations, Objective, OutputErrors
@@ -36,7 +36,7 @@ from gaident.models.simulate import simulate
 from gaident.policy.table import POLICY
 from gaident.results.inverse_dynamics import InverseDynamics
 
-__all__ = ["ByOutputErrors", "Task", "linear_bases", "noise_floor", "output_error_bases"]
+__all__ = ["ByOutputErrors", "Task", "linear_bases", "noise_floor", "output_error_bases", "specification"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -345,3 +345,25 @@ def _corner(axis: InverseDynamics) -> float:
     values = {name: e.value for name, e in axis.parameters.items()}
     viscous = values.get("viscous", min(values.get("viscous_positive", 0.0), values.get("viscous_negative", 0.0)))
     return max(viscous / values["inertia"], 0.0)
+
+
+def specification(space: Moves, task: Task, fit: Fit) -> Specification:
+    """The specification test: the output errors of the whitened and of the output-error estimate of one model.
+
+    task: the one whose output errors are taken.
+    What no estimate moves by slope, the order of a harmonic, is the same in both and no degree of freedom.
+    H is 0 where the whitened estimate's errors are no larger than noise, as torques and in the free run.
+    Where they are that, and white without a filter, the two estimates are one: no prefilter keeps white noise from being noise.
+    """
+    freedom = int(np.count_nonzero(fit.parameters.steps()))
+    bound = chi_square_bound(freedom, space.policy.noise_level)
+    free = space.small_unwhitened(fit)
+    if free and fit.noise.size == 0 and space.is_noise(fit):
+        return Specification(0.0, bound)
+    output = task.by_output_errors.objective
+    whole = float(np.sum(output.unwhitened_errors(fit) ** 2))
+    if free and whole < output.count * (space.policy.noise_ratio * space.noise_beside(fit)) ** 2:
+        return Specification(0.0, bound)
+    least = output.unwhitened_errors(ls.fit(output, fit.hypothesis, fit.x, WHITE, space.policy.usual))
+    information = min(effective_samples(least), output.count)
+    return Specification(specification_statistic(whole, float(least @ least), information), bound)

@@ -73,7 +73,7 @@ class NoiseLevel:
         rows = torque_noise_draws(fit.predictor, fit.parameters, fit.x, self.noise_beside(fit), self.policy.level_draws)
         inertias = self.objective.inertias(fit.hypothesis, np.repeat(fit.x[None, :], len(rows), axis=0))
         errors = self.objective.whitened(rows, WHITE, inertias)
-        return float(np.sqrt(np.sum(errors**2) / (len(rows) * self.objective.count)))
+        return float(np.sqrt(np.sum(errors**2) / (len(rows) * self.objective.counted.sum())))
 
     def ratio(self, fit: Fit) -> float:
         """Rms of the errors over what noise leaves in them."""

@@ -19,23 +19,33 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from gaident.diagnosis.selection.bases import ByOutputErrors, Task, heaviest, linear_bases, noise_floor, output_error_bases
+from gaident.diagnosis.selection.bases import (
+    ByOutputErrors,
+    Task,
+    heaviest,
+    linear_bases,
+    noise_floor,
+    output_error_bases,
+    specification,
+)
 from gaident.diagnosis.selection.beam import Beam
 from gaident.diagnosis.selection.beam import reduced as reduced_by
 from gaident.diagnosis.selection.decimated import blocks_of, decimated_objective, moved
+from gaident.diagnosis.selection.load_moves import LoadMoves
 from gaident.diagnosis.selection.mechanisms import drives_itself, on_no_shaft, resonance, swings
 from gaident.diagnosis.selection.model_space import words
 from gaident.diagnosis.selection.moves import Moves
 from gaident.diagnosis.selection.rivals import Classes, Replacement, of_each_effect
 from gaident.estimation import least_squares as ls
-from gaident.estimation.criterion import Specification, chi_square_bound, effective_samples, specification_statistic
+from gaident.estimation.criterion import Specification, effective_samples
+from gaident.estimation.load_sensor.signals import LoadSensor
 from gaident.estimation.noise_model import WHITE, ShaftNoise
 from gaident.estimation.objective import Fit, Innovations, Objective, OutputErrors
 from gaident.estimation.term import Scales, Term
 from gaident.models.model import Model
 from gaident.policy.table import POLICY
 
-__all__ = ["Selection", "by_whitened_errors", "compared", "selected", "specification"]
+__all__ = ["Selection", "beside_load", "by_whitened_errors", "compared", "selected", "specification"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,9 +79,9 @@ class Selection:
         family = replace(family, prefilter=replace(family.prefilter, corner=ratio * family.prefilter.corner))
         if family.inertia is not None:
             family = replace(family, inertia=heaviest(objective.data, final) or family.inertia)
-        fit = ls.fit(objective.under(family), final.hypothesis, final.x, WHITE, POLICY.usual)
+        fit = ls.fit(objective.under_beside(family, final), final.hypothesis, final.x, WHITE, POLICY.usual)
         samples = effective_samples(objective.under(family).unwhitened_errors(fit))
-        objective = objective.under(replace(family, samples=samples))
+        objective = objective.under_beside(replace(family, samples=samples), final)
         return objective, objective.rescored(fit)
 
 
@@ -303,28 +313,6 @@ def _as_innovations(space: Moves, fit: Fit) -> Fit:
     return space.behind_a_lag(found)
 
 
-def specification(space: Moves, task: Task, fit: Fit) -> Specification:
-    """The specification test: the output errors of the whitened and of the output-error estimate of one model.
-
-    task: the one whose output errors are taken.
-    What no estimate moves by slope, the order of a harmonic, is the same in both and no degree of freedom.
-    H is 0 where the whitened estimate's errors are no larger than noise, as torques and in the free run.
-    Where they are that, and white without a filter, the two estimates are one: no prefilter keeps white noise from being noise.
-    """
-    freedom = int(np.count_nonzero(fit.parameters.steps()))
-    bound = chi_square_bound(freedom, space.policy.noise_level)
-    free = space.small_unwhitened(fit)
-    if free and fit.noise.size == 0 and space.is_noise(fit):
-        return Specification(0.0, bound)
-    output = task.by_output_errors.objective
-    whole = float(np.sum(output.unwhitened_errors(fit) ** 2))
-    if free and whole < output.count * (space.policy.noise_ratio * space.noise_beside(fit)) ** 2:
-        return Specification(0.0, bound)
-    least = output.unwhitened_errors(ls.fit(output, fit.hypothesis, fit.x, WHITE, space.policy.usual))
-    information = min(effective_samples(least), output.count)
-    return Specification(specification_statistic(whole, float(least @ least), information), bound)
-
-
 def _on_all_samples(task: Task, outline: _Found, note: Callable[[str], None]) -> _Found:
     """The model found on the coarse grid, fitted to all samples, reduced, and grown by what the grid could not show.
 
@@ -392,6 +380,19 @@ def _compared(found: _Found, classes: Classes, note: Callable[[str], None]) -> S
 def by_whitened_errors(selection: Selection, classes: Classes, note: Callable[[str], None]) -> Selection | None:
     """What whitened errors had selected, with its rivals; None where that model decided, or none was searched."""
     return None if selection.whitened is None else _compared(selection.whitened, classes, note)
+
+
+def beside_load(selection: Selection, sensor: LoadSensor, classes: Classes, note: Callable[[str], None]) -> Selection:
+    """The selection once more from its model, with a sensor of the load, weighed by what the model before left there."""
+    note("looking at the load's sensor")
+    final = selection.final
+    for _ in range(POLICY.rounds):
+        space = LoadMoves.beside(selection.space, sensor, final)
+        found = _grown(space, space.refitted(final.hypothesis, final.x))
+        same, final = space.key(found) == space.key(final), found
+        if same:
+            break
+    return _compared(_Found(space, selection.base, final), classes, note)
 
 
 def compared(selection: Selection, final: Fit, classes: Classes, note: Callable[[str], None]) -> Selection:

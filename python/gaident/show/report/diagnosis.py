@@ -226,6 +226,12 @@ def _parameters(dia: Diagnosis, view: View, drawn: Charts) -> Section:
             )
         parts.append(filled_table(("", "value", "unit", "", "linear fit alone", "moved", ""), rows))
         parts.append(tag("p", tag("small", f"± {SPREAD} The colour of the noise is taken into account.")))
+    if dia.load_sensor:
+        sensor = [
+            (name, estimate(e.value, e.std), typeset("" if e.unit == "1" else unit(e.unit, axis)))
+            for name, e in dia.load_sensor.items()
+        ]
+        parts += [tag("h3", "Load sensor: its signal over the motion of the load"), filled_table(("", "value", "unit"), sensor)]
     if any(not f.is_noise for f in dia.findings):
         parts.append(tag("p", "The parameters of the effects stand with their cause above."))
     parts += [tag("h3", f"{word('Torque', axis)} to velocity, linear part")]
