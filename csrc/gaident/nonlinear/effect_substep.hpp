@@ -72,10 +72,13 @@ template <Side side, class States>
     each_at<side>([&]<class Key, class E>() __attribute__((always_inline)) {
         if constexpr (hook::level<E>)
             if (run_.effects.has<Key>()) add(E::level(c_.template of<Key>(), R(t > 0.0 ? t : 0.0)));
-        if constexpr (hook::loaded<E> && side == Side::load)
-            if (run_.effects.has<Key>()) add(E::loaded(c_.template of<Key>(), load_.braking));
-        if constexpr (hook::level_of_angle<E> && side == Side::load)
-            if (run_.effects.has<Key>()) add(E::level_of_angle(c_.template of<Key>(), load_.theta));
+        // Asked before E is: Clang looks for the members of load_ where it does not know E yet.
+        if constexpr (side == Side::load) {
+            if constexpr (hook::loaded<E>)
+                if (run_.effects.has<Key>()) add(E::loaded(c_.template of<Key>(), load_.braking));
+            if constexpr (hook::level_of_angle<E>)
+                if (run_.effects.has<Key>()) add(E::level_of_angle(c_.template of<Key>(), load_.theta));
+        }
     });
     if constexpr (side == Side::motor)
         if (run_.effects.meets(effects_with(Hooks::loaded | Hooks::level_of_angle))) [[unlikely]] {

@@ -14,6 +14,7 @@
 #pragma once
 
 #include "arithmetic.hpp"
+#include "bit_cast.hpp"
 
 #include <bit>
 #include <cstdint>
@@ -68,7 +69,7 @@ struct C30 {
 
     explicit constexpr operator double() const {
         const auto bits = static_cast<std::uint64_t>(1023 + exponent - 31) << 52;
-        return static_cast<double>(mantissa) * std::bit_cast<double>(bits);
+        return static_cast<double>(mantissa) * bit_cast<double>(bits);
     }
 };
 
@@ -79,7 +80,7 @@ constexpr C30Word::C30Word(C30 x) {
 }
 
 constexpr C30Word::C30Word(double x) {
-    const auto b = std::bit_cast<std::uint64_t>(x);
+    const auto b = bit_cast<std::uint64_t>(x);
     const int e = static_cast<int>(b >> 52 & 0x7FF);
     if (e == 0) return;  // 0, and what is far below the smallest word
     const auto size = static_cast<std::int64_t>((b & 0xFFFFFFFFFFFFFULL) | 1ULL << 52);

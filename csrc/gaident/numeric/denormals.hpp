@@ -41,6 +41,11 @@ public:
         return c;
     }
     static void set_control(Control c) { asm volatile("vmsr fpscr, %0" : : "r"(c)); }
+#elif defined(__wasm__)  // none: this one is for the product and sum in one, which is made by hand there (fused.hpp)
+    using Control = unsigned;
+    static constexpr Control flush = 1;
+    static Control control() { return by_hand; }
+    static void set_control(Control c) { by_hand = c; }
 #else                    // none: denormals cost what they cost
     using Control = unsigned;
     static constexpr Control flush = 0;
@@ -49,6 +54,9 @@ public:
 #endif
 
 private:
+#if defined(__wasm__)
+    static inline Control by_hand = 0;  // the core has no threads there
+#endif
     Control saved_;
 };
 

@@ -2,10 +2,10 @@
 // comparisons as selections, rounding, exponential and sine by polynomials (no libm), the square root by the processor (correctly rounded).
 #pragma once
 
+#include "bit_cast.hpp"
 #include "lanes.hpp"
 #include "single.hpp"
 
-#include <bit>
 #include <cstdint>
 
 namespace gaident {
@@ -136,7 +136,7 @@ inline constexpr double round_magic = 6755399441055744.0;  // 1.5 * 2^52: adding
 
 // x * 2^k, where `shifted` is round_magic + k; no overflow is looked after
 [[gnu::always_inline]] inline double scaled(double x, double shifted) {
-    return std::bit_cast<double>(std::bit_cast<std::uint64_t>(x) + (std::bit_cast<std::uint64_t>(shifted) << 52U));
+    return bit_cast<double>(bit_cast<std::uint64_t>(x) + (bit_cast<std::uint64_t>(shifted) << 52U));
 }
 
 template <class Isa>

@@ -14,6 +14,7 @@
 #pragma once
 
 #include "arithmetic.hpp"
+#include "bit_cast.hpp"
 
 #include <bit>
 #include <cstdint>
@@ -38,7 +39,7 @@ struct FixedNumber {
 
     constexpr FixedNumber() = default;
     explicit constexpr FixedNumber(double x) {
-        const auto b = std::bit_cast<std::uint64_t>(x);
+        const auto b = bit_cast<std::uint64_t>(x);
         const int e = static_cast<int>(b >> 52 & 0x7FF);
         if (e == 0) return;
         const auto size = static_cast<std::int64_t>((b & 0xFFFFFFFFFFFFFULL) | 1ULL << 52);
@@ -66,7 +67,7 @@ struct FixedNumber {
         return x;
     }
     explicit constexpr operator double() const {
-        return static_cast<double>(word) * std::bit_cast<double>(static_cast<std::uint64_t>(1023 - point) << 52);
+        return static_cast<double>(word) * bit_cast<double>(static_cast<std::uint64_t>(1023 - point) << 52);
     }
 };
 

@@ -5,6 +5,7 @@
 // Written out, and never the compiler's choice (the build forbids contraction), so that every instruction set gives the same bits: the
 // processor's own instruction where the source is compiled for one that has it, else the C library's function, which takes that
 // instruction where the processor has it, and is exact and slow where not.
+// WebAssembly has no such instruction: there the operation is made of others (fused_wasm.hpp).
 // That of MinGW rounds twice: there the instruction is called, and a processor without it (before 2013) has other bits.
 // Where c is what the step before has left, it takes part last: one operation from one sample to the next, not two.
 //
@@ -15,10 +16,11 @@
 
 #if defined(__FMA__)
 #include <immintrin.h>
-#elif defined(__SSE2__)
+#elif defined(__SSE2__) || defined(__wasm_simd128__)
+#include "bit_cast.hpp"
 #include "denormals.hpp"
+#include "fused_wasm.hpp"
 
-#include <bit>
 #include <cstdint>
 #include <limits>
 #elif defined(__aarch64__)
@@ -39,7 +41,7 @@ inline const bool processor_fuses = __builtin_cpu_supports("fma") != 0;
 [[gnu::always_inline]] inline float fused(float a, float b, float c) {
     return processor_fuses ? instruction(a, b, c) : __builtin_fmaf(a, b, c);
 }
-#elif defined(__SSE2__) && !defined(__FMA__)
+#elif (defined(__SSE2__) && !defined(__FMA__)) || defined(__wasm_simd128__)
 // The C library's function without the instruction splits its operands and adds up what is lost.
 // Where denormals are flushed (FlushDenormals) some of these parts are, and from 1e-291 down its results are wrong;
 // the instruction flushes operands and result and nothing in between.
@@ -50,14 +52,18 @@ inline const bool processor_fuses = __builtin_cpu_supports("fma") != 0;
     const unsigned before = FlushDenormals::control();
     const bool flushed = (before & FlushDenormals::flush) != 0;
     const auto flush = [flushed](double& x) {  // by its bits: whatever the control word says
-        const bool small = (std::bit_cast<std::uint64_t>(x) & 0x7ff0'0000'0000'0000) == 0;
+        const bool small = (bit_cast<std::uint64_t>(x) & 0x7ff0'0000'0000'0000) == 0;
         if (flushed && small) x = __builtin_copysign(0.0, x);
     };
     const auto call = [](double x, double y, double z) {
+#if defined(__SSE2__)
         asm volatile("" : "+x"(x), "+x"(y), "+x"(z));  // the call stays between the two settings of the control word
         double r = __builtin_fma(x, y, z);
         asm volatile("" : "+x"(r));
         return r;
+#else
+        return __builtin_fma(x, y, z);
+#endif
     };
     flush(a), flush(b), flush(c);
     FlushDenormals::set_control(before & ~FlushDenormals::flush);
@@ -74,6 +80,14 @@ inline const bool processor_fuses = __builtin_cpu_supports("fma") != 0;
     return r;
 }
 
+#if defined(__wasm_simd128__)
+[[gnu::always_inline]] inline double fused(double a, double b, double c) {
+    return fused_of_two<fma_between_flushes>(TwoDoubles{a, a}, TwoDoubles{b, b}, TwoDoubles{c, c})[0];
+}
+[[gnu::always_inline]] inline float fused(float a, float b, float c) {
+    return fused_of_floats(a, b, c, (FlushDenormals::control() & FlushDenormals::flush) != 0);
+}
+#else
 // Whether the library goes without the instruction is asked of the library itself, by two products that then go wrong.
 inline bool library_goes_without() {
     const auto right = [](double x, double y, double z, double expected) {
@@ -90,10 +104,11 @@ inline const bool without_instruction = library_goes_without();
 [[gnu::always_inline]] inline double fused(double a, double b, double c) {
     return without_instruction ? fma_between_flushes(a, b, c) : __builtin_fma(a, b, c);
 }
+#endif
 #else
 [[gnu::always_inline]] inline double fused(double a, double b, double c) { return __builtin_fma(a, b, c); }
 #endif
-#if !(defined(__MINGW32__) && defined(__x86_64__)) || defined(__FMA__)
+#if !defined(__wasm_simd128__) && (!(defined(__MINGW32__) && defined(__x86_64__)) || defined(__FMA__))
 [[gnu::always_inline]] inline float fused(float a, float b, float c) { return __builtin_fmaf(a, b, c); }
 #endif
 
@@ -129,6 +144,16 @@ GAIDENT_FUSED(64, 8, __m512d, _mm512_fmadd_pd, _mm512_fnmadd_pd);
 GAIDENT_FUSED(64, 4, __m512, _mm512_fmadd_ps, _mm512_fnmadd_ps);
 #endif
 #undef GAIDENT_FUSED
+#elif defined(__wasm_simd128__)
+template <class Isa>
+struct Fused<Isa, 16, 8> {
+    static constexpr bool there = true;
+    // Not inlined: some forty operations.
+    [[gnu::noinline]] static TwoDoubles plus(TwoDoubles a, TwoDoubles b, TwoDoubles c) {
+        return fused_of_two<fma_between_flushes>(a, b, c);
+    }
+    [[gnu::always_inline]] static inline TwoDoubles minus(TwoDoubles a, TwoDoubles b, TwoDoubles c) { return plus(-a, b, c); }
+};
 #elif defined(__aarch64__)
 template <class Isa>
 struct Fused<Isa, 16, 8> {

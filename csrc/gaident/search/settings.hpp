@@ -52,12 +52,15 @@ struct Progress {
     std::atomic<double> best{worst_cost};
     std::atomic<std::size_t> species{0};  // those that compete; 0: none are kept apart
     std::atomic<int> leading{-1};         // the species of the least local optimum so far; -1: none yet
+    // Where set, called at the end of each note() by the thread that notes: for a caller without a second thread to look with.
+    void (*noted)(const Progress&) = nullptr;
 
     void note(std::size_t generations, double cost_now) {
         done += generations;
         double seen = best.load();
         while (cost_now < seen && !best.compare_exchange_weak(seen, cost_now)) {
         }
+        if (noted != nullptr) noted(*this);
     }
 
     // Trials that run side by side may report in the same moment; the species is for the eye only.

@@ -19,6 +19,7 @@
 
 #include "candidate.hpp"
 #include "../numeric/apart.hpp"
+#include "../numeric/bit_cast.hpp"
 #include "../numeric/fixed.hpp"
 
 namespace gaident {
@@ -42,7 +43,7 @@ inline Factors<Apart> end_of_ranges(const SearchRanges& ranges, Structure s) {
 
 // The largest binary point at which `size` fits a word.
 constexpr int point_for(double size) {
-    const int e = static_cast<int>(std::bit_cast<std::uint64_t>(size) >> 52 & 0x7FF) - 1023;  // size < 2^(e+1)
+    const int e = static_cast<int>(bit_cast<std::uint64_t>(size) >> 52 & 0x7FF) - 1023;  // size < 2^(e+1)
     return 30 - e;
 }
 
