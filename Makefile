@@ -35,7 +35,7 @@ SOURCES := pyproject.toml CMakeLists.txt LICENSE README.md \
 ifndef SIDE_BY_SIDE
 .NOTPARALLEL:
 endif
-.PHONY: help install demo test fuzz bench real bare oldest embedded wheel windows tidy docs lint test-cpp test-python test-long clean build-checked test-checked test-sanitized
+.PHONY: help install demo test fuzz bench real bare oldest embedded wasm wheel windows tidy docs lint test-cpp test-python test-long clean build-checked test-checked test-sanitized
 .DEFAULT_GOAL := help
 
 help: ## list the commands
@@ -113,6 +113,10 @@ embedded: ## the search in a drive, on two emulated Cortex-M boards, and the rec
 	@$(MAKE) --no-print-directory -f csrc/embedded/embedded.mk OUT=build/embedded
 	@if csrc/embedded/tools.sh arm64; then $(MAKE) --no-print-directory --jobs=$(JOBS) -f csrc/embedded/arm64.mk OUT=build/embedded; \
 		else echo "ARM64 left out: its tools do not install here" >&2; fi
+
+wasm: ## the core as WebAssembly, run in node and compared bit for bit (docs/try.md)
+	@csrc/embedded/tools.sh wasm
+	@$(MAKE) --no-print-directory --jobs=$(JOBS) -f csrc/wasm/wasm.mk OUT=build/wasm
 
 # What a user gets who has no compiler: only the environment's own programs are on the path; the demo runs, and the tests in WHEEL_TESTS.
 WHEEL := build/wheel

@@ -1,13 +1,19 @@
 #!/bin/sh
-# What `make embedded` needs: looks for it, installs it where this is Debian and we are root or may become so, and otherwise says how.
+# What `make embedded` and `make wasm` need: looks for it, installs it where this is Debian and we are root or may become so, and otherwise says how.
 #
 #     tools.sh          for the drive's processors
 #     tools.sh arm64    for ARM64
+#     tools.sh wasm     for WebAssembly
 #
 # Exit code 0: everything is there.
 if [ "${1:-}" = arm64 ]; then
     packages="g++-aarch64-linux-gnu qemu-user-static"
     have() { command -v qemu-aarch64-static && command -v aarch64-linux-gnu-g++; } >/dev/null 2>&1
+elif [ "${1:-}" = wasm ]; then
+    packages="emscripten nodejs"
+    have() { command -v em++ && command -v "${NODE:-node}"; } >/dev/null 2>&1
+    # Another node than Debian's is as good.
+    ! command -v "${NODE:-node}" >/dev/null 2>&1 || packages="emscripten"
 else
     packages="gcc-arm-none-eabi libstdc++-arm-none-eabi-newlib qemu-system-arm"
     have() {
@@ -27,5 +33,5 @@ if command -v apt-get >/dev/null 2>&1; then
         have && exit 0
     fi
 fi
-echo "the cross compiler and the emulator are missing; on Debian: apt install $packages" >&2
+echo "the cross compiler and what runs its programs are missing; on Debian: apt install $packages" >&2
 exit 1
