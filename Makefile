@@ -35,7 +35,7 @@ SOURCES := pyproject.toml CMakeLists.txt LICENSE README.md \
 ifndef SIDE_BY_SIDE
 .NOTPARALLEL:
 endif
-.PHONY: help install demo test fuzz bench real bare oldest embedded wasm wheel windows tidy docs lint test-cpp test-python test-long clean build-checked test-checked test-sanitized
+.PHONY: help install demo test fuzz bench real bare oldest embedded wasm try wheel windows tidy docs lint test-cpp test-python test-long clean build-checked test-checked test-sanitized
 .DEFAULT_GOAL := help
 
 help: ## list the commands
@@ -114,9 +114,15 @@ embedded: ## the search in a drive, on two emulated Cortex-M boards, and the rec
 	@if csrc/embedded/tools.sh arm64; then $(MAKE) --no-print-directory --jobs=$(JOBS) -f csrc/embedded/arm64.mk OUT=build/embedded; \
 		else echo "ARM64 left out: its tools do not install here" >&2; fi
 
-wasm: ## the core as WebAssembly, run in node and compared bit for bit (docs/try.md)
+wasm: .venv/.installed ## the core as WebAssembly, compared bit for bit in node; the page that identifies in a browser (docs/try.md)
 	@csrc/embedded/tools.sh wasm
 	@$(MAKE) --no-print-directory --jobs=$(JOBS) -f csrc/wasm/wasm.mk OUT=build/wasm
+	@$(MAKE) --no-print-directory try
+
+# The page alone.
+try: .venv/.installed
+	@$(MAKE) --no-print-directory --silent --jobs=$(JOBS) -f csrc/wasm/wasm.mk OUT=build/wasm core
+	$(BIN)/python docs/tools/try_page.py build/wasm/core.js build/try/index.html
 
 # What a user gets who has no compiler: only the environment's own programs are on the path; the demo runs, and the tests in WHEEL_TESTS.
 WHEEL := build/wheel
@@ -155,6 +161,7 @@ tidy: .venv/.tidied ## repair and format the Python and C++ sources
 docs: .venv/.documented ## build the documentation into build/docs
 	$(BIN)/python -W error docs/tools/pictures.py docs/pictures
 	$(BIN)/python -W error docs/tools/run_pages.py
+	@if command -v em++ >/dev/null; then $(MAKE) --no-print-directory try; else echo "without the page docs/try: no emscripten here" >&2; fi
 	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict
 	@echo "written: build/docs/index.html"
 

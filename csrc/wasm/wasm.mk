@@ -1,5 +1,5 @@
-# Builds the core for WebAssembly, and the programs that print its bits (tests/cpp/bits.cpp, search_bits.cpp) for WebAssembly and for this
-# machine; runs the first in node, compares line by line. Called by `make wasm` at the top.
+# Builds the core for WebAssembly, and the programs that print its bits (bits.cpp, search_bits.cpp in tests/cpp) for WebAssembly and
+# for this machine; runs the first in node, compares line by line. Called by `make wasm` at the top.
 #
 #     core     $(OUT)/core.js: the C interface in one file, no threads, for the page docs/try
 OUT ?= build/wasm
@@ -13,16 +13,17 @@ CORE := csrc/gaident
 HERE := csrc/wasm
 PLANT := $(wildcard $(addprefix $(CORE)/,simulation/*.cpp runtime/*.cpp)) \
 	$(addprefix $(CORE)/simulation/kernels/,dispatch.cpp kernel_baseline.cpp)
-EFFECTS := $(wildcard $(CORE)/nonlinear/*.cpp) $(addprefix $(CORE)/nonlinear/kernels/,dispatch_effects.cpp kernel_effects_baseline.cpp)
-SEARCH := $(wildcard $(addprefix $(CORE)/,genetic/*.cpp search/*.cpp estimation/*.cpp identification/*.cpp target/*.cpp plant/*.cpp \
-	numeric/*.cpp)) $(HERE)/interface.cpp
-SOURCES := $(PLANT) $(EFFECTS) $(SEARCH) tests/cpp/bits.cpp $(HERE)/search_bits.cpp
+EFFECTS := $(wildcard $(CORE)/nonlinear/*.cpp) \
+	$(addprefix $(CORE)/nonlinear/kernels/,dispatch_effects.cpp kernel_effects_baseline.cpp)
+ROOMS := genetic search estimation identification target plant numeric
+SEARCH := $(wildcard $(ROOMS:%=$(CORE)/%/*.cpp)) $(HERE)/interface.cpp
+SOURCES := $(PLANT) $(EFFECTS) $(SEARCH) tests/cpp/bits.cpp tests/cpp/search_bits.cpp
 HEADERS := $(shell find $(CORE) tests/cpp $(HERE) -name '*.hpp' -o -name '*.h')
 vpath %.cpp $(sort $(dir $(SOURCES)))
 
 objects = $(addsuffix .o,$(addprefix $(OUT)/$1/,$(basename $(notdir $2))))
 BITS := $(PLANT) $(EFFECTS) tests/cpp/bits.cpp
-SEARCH_BITS := $(PLANT) $(SEARCH) $(HERE)/search_bits.cpp
+SEARCH_BITS := $(PLANT) $(SEARCH) tests/cpp/search_bits.cpp
 
 FLAGS := -std=c++20 -ffp-contract=off -Wno-psabi -I csrc -I tests/cpp
 # Exceptions are WebAssembly's own; fused products are made two at a time (numeric/fused_wasm.hpp).
@@ -48,7 +49,8 @@ $(OUT)/%.checked: $(OUT)/%.here.txt $(OUT)/%.wasm.txt
 	cmp $^
 	@echo "WebAssembly: $$(wc -l < $<) lines of $* equal to this machine's, bit for bit" > $@
 
-# As a processor without the instruction runs the C library: with it exp and log have other last bits. (Of no meaning to other libraries.)
+# As a processor without the instruction runs the C library: with it exp and log have other last bits.
+# (Other libraries take no notice.)
 $(OUT)/%.here.txt: $(OUT)/%.here
 	GLIBC_TUNABLES=glibc.cpu.hwcaps=-FMA,-FMA4,-AVX2,-FMA_Usable,-FMA4_Usable,-AVX2_Usable $< > $@
 $(OUT)/%.wasm.txt: $(OUT)/%.js

@@ -2,7 +2,7 @@
 
 $$ ... $$ and $ ... $ are LaTeX, turned into MathML, which browsers draw by themselves, offline too. A line
 `<!-- effect: NAME -->` becomes the effect's picture and its parameters from the registry. Links to files outside docs/ become
-their names, and pages that the navigation does not list stand at its end.
+their names, and pages that the navigation does not list stand at its end. The page of docs/try is copied to the site.
 """
 
 from __future__ import annotations
@@ -22,6 +22,11 @@ EFFECT = re.compile(r"^<!-- effect: (\w+) -->$", re.MULTILINE)
 OUTSIDE = re.compile(r"\[([^\]]*)\]\((?:\.\./)+(?!.*\.svg)([^)#]*)\)")
 CODE = re.compile(r"(```.*?```|`[^`\n]*`)", re.DOTALL)
 FURTHER = "Further"
+NOT_BUILT = """<!DOCTYPE html>
+<html lang="en"><meta charset="utf-8"><title>Not built</title>
+<p>The page that identifies in a browser is not part of this copy of the documentation:
+it is built with Debian's emscripten (<code>apt install emscripten</code>, then <code>make wasm</code>).</p></html>
+"""
 
 
 def on_config(config: Config) -> Config:
@@ -54,6 +59,16 @@ def on_page_markdown(markdown: str, page: Page, config: Config, files: Any) -> s
         if missing:
             raise ValueError(f"docs/catalogue.md: {', '.join(sorted(missing))} is in the registry or on the page only")
     return EFFECT.sub(lambda m: _effect(m[1]), markdown)
+
+
+def on_post_build(config: Config) -> None:
+    """The page of docs/try in the site; where it was not built, a page that says how."""
+    built, shown = (
+        Path(config["docs_dir"]).parent / "build" / "try" / "index.html",
+        Path(config["site_dir"]) / "try" / "index.html",
+    )
+    shown.parent.mkdir(parents=True, exist_ok=True)
+    shown.write_text(built.read_text(encoding="utf-8") if built.exists() else NOT_BUILT, encoding="utf-8")
 
 
 def _formulas(text: str) -> str:

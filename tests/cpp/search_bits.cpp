@@ -2,11 +2,11 @@
 // their statistics are made of, and a run of each. Compared between WebAssembly and this machine, which must not differ.
 // Before them, how many products and sums in one differ from the C library's, which are exact, and a digest of those of floats (whose
 // function in WebAssembly's library rounds twice now and then).
-#include "interface.h"
+#include "wasm/interface.h"
 
-#include "../gaident/numeric/arithmetic.hpp"
-#include "../gaident/numeric/bit_cast.hpp"
-#include "../gaident/numeric/rng.hpp"
+#include "gaident/numeric/arithmetic.hpp"
+#include "gaident/numeric/bit_cast.hpp"
+#include "gaident/numeric/rng.hpp"
 
 #include <cmath>
 #include <cstdint>
