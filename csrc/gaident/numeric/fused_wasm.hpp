@@ -3,7 +3,7 @@
 // Of plain operations that round once each (S. Boldo, G. Melquiond, "Emulation of a FMA and correctly rounded sums: proved algorithms
 // using rounding to odd", IEEE Transactions on Computers 57, 2008): the product as p + e exactly, then the three numbers p, e and c are
 // added exactly as vh + vl + l, and vl + l is rounded to odd, so that the last addition rounds as if it were the only one.
-// This is exact where no part is lost at the ends of the number range; such operands, and zeros, go to the function `other` one by one.
+// This is exact where no part is lost at the ends of the number range; such operands go to the function `other` one by one.
 #pragma once
 
 #if defined(__wasm_simd128__)
@@ -36,7 +36,7 @@ typedef std::int64_t TwoWords __attribute__((vector_size(16)));
     const TwoDoubles sum = exact_sum(a, b, rest);
     const TwoWords bits = reinterpret_cast<TwoWords>(sum);
     // The exact sum is further from 0 than `sum` where the rest has its sign.
-    const TwoWords outwards = 1 | ((bits ^ reinterpret_cast<TwoWords>(rest)) >> 63);
+    const TwoWords outwards = 1 | ((bits ^ reinterpret_cast<TwoWords>(rest)) < 0);
     const TwoWords to_be_moved = (rest != 0.0) & ((bits & 1) == 0);
     return reinterpret_cast<TwoDoubles>(bits + (outwards & to_be_moved));
 }
@@ -50,12 +50,14 @@ template <double (*other)(double, double, double)>
     };
     TwoDoubles e, l, vl;
     const TwoDoubles p = exact_product(a, b, e), of_c = size(c);
-    const TwoWords inside =
-        (size(a) < factor) & (size(b) < factor) & (size(p) > least) & (of_c < most) & ((of_c > least) | (c == 0.0));
-    if (!__builtin_wasm_all_true_i64x2(inside)) [[unlikely]]
-        return TwoDoubles{other(a[0], b[0], c[0]), other(a[1], b[1], c[1])};
-    const TwoDoubles th = exact_sum(c, e, l), vh = exact_sum(p, th, vl);
-    return vh + odd_sum(l, vl);
+    const TwoWords factors = (size(a) < factor) & (size(b) < factor), addend = (of_c < most) & ((of_c > least) | (c == 0.0));
+    const TwoDoubles th = exact_sum(c, e, l), vh = exact_sum(p, th, vl), sum = vh + odd_sum(l, vl);
+    if (__builtin_wasm_all_true_i64x2(factors & addend & (size(p) > least))) [[likely]]
+        return sum;
+    // A factor of 0, as a held plant has one in every sample: its product is exact.
+    const TwoWords zero = (a == 0.0) | (b == 0.0);
+    if (__builtin_wasm_all_true_i64x2(factors & addend & ((size(p) > least) | zero))) return zero ? p + c : sum;
+    return TwoDoubles{other(a[0], b[0], c[0]), other(a[1], b[1], c[1])};
 }
 
 // Of floats in double, where their product is exact; with denormals flushed as an instruction does it, after rounding to 24 bits.
