@@ -5,7 +5,7 @@
 namespace gaident {
 
 template <class To, class From>
-constexpr To bit_cast(const From& from) noexcept {
+[[gnu::always_inline]] constexpr To bit_cast(const From& from) noexcept {
     static_assert(sizeof(To) == sizeof(From));
     return __builtin_bit_cast(To, from);
 }
