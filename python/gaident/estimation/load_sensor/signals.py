@@ -2,7 +2,7 @@
 
     y = s (theta + (theta_L - theta_M)) + o + noise          of a position; of a velocity w in the place of theta
 
-theta: angle of the motor as it was measured; theta_L: of the simulated load; theta_M: of the simulated motor as it would be measured.
+theta: angle of the motor as measured; theta_L: of the simulated load; theta_M: of the simulated motor as it would be measured.
 For one mass theta_L is theta_M.
 So only how the load follows counts: what disturbs motor and load together is in neither side.
 Where the motor's angle is the integral of its measured velocity, theta_M is the same sum over the simulated velocity.
