@@ -13,6 +13,7 @@ from gaident.axis import Text, say
 from gaident.control.controller import Controller, checked_controller
 from gaident.control.pi import bare_pi
 from gaident.data.record import Record
+from gaident.diagnosis.at_the_load import NO_P_VALUE
 from gaident.diagnosis.blas import one_thread
 from gaident.diagnosis.controller.as_read import in_terms_of_the_log, outliers_of_the_log
 from gaident.diagnosis.controller.driving import Driving, driving_of
@@ -31,6 +32,7 @@ from gaident.diagnosis.records.arguments import (
     noise_std_of,
     records_of,
 )
+from gaident.diagnosis.selection.load_moves import LoadMoves
 from gaident.diagnosis.unlogged.unlogged_form import in_series
 from gaident.diagnosis.work import Work
 from gaident.errors import SettingsError
@@ -289,7 +291,9 @@ def diagnose(
         answered = work.at_controller.decided or any(f.place == "controller" for f in result.findings)
         times = jump_notes(prepared[0].given)
         result = replace(result, notes=(*driving.notes, *times, *discarded, *(() if answered else driving.doubts), *result.notes))
-        if bootstrap:
+        if bootstrap and isinstance(work.found.space, LoadMoves):
+            result = replace(result, notes=(*result.notes, NO_P_VALUE))
+        elif bootstrap:
             from gaident.diagnosis.selection.bootstrap import with_p_value
 
             space = work.found.space

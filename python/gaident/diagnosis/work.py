@@ -243,8 +243,6 @@ class Work:
                 # A noise filter removes a slow misfit completely; the free run shows it.
                 driver = self.left.strongest or "time"
                 self.notes.append(far_off(beyond))
-            if not explains_load(self.found):
-                driver = driver or self.left.strongest or "time"
             if driver is None and self.data.torque_measured and not gains.closed:
                 self.notes.append(hidden_by_torque_noise(floor))
             causes = [e for e in self.final.effects if not self._only_describes(e, driver)]
@@ -298,7 +296,8 @@ class Work:
         real = [f for f in findings if not f.is_noise]
         answered = {*self.not_testable, *(name for f in findings for name in (f.effect, *f.alternatives))}
         self.notes += (*together, *notes, *self.doubts, *load_words(self.found))
-        verdict = verdict_of(bool(real), driver is not None, bool(self.doubts) or (self.data.slower and self.driving.in_doubt))
+        left, in_doubt = driver is not None or not explains_load(self.found), bool(self.doubts)
+        verdict = verdict_of(bool(real), left, in_doubt or (self.data.slower and self.driving.in_doubt))
         if driver is not None and (dropped := [e for e in self.final.effects if e not in causes]):
             shown = driver if self.left.gains[driver] > self.left.needed else None
             self.notes.append(closest(dropped, shown, bool(real)))

@@ -104,11 +104,11 @@ def _joined(data: DataSet) -> DataSet:
 def variance_of(objective: Objective, fit: Fit, v: Vector) -> float:
     """Mean square of the whitened errors; of output errors of colour it grows by samples over independent samples.
 
-    Such samples contain less than their number.
+    Such samples contain less than their number. A cost that is a mean over several sensors weighs each of their errors less.
     """
     dof = max(objective.count - int(np.count_nonzero(fit.parameters.steps() > 0.0)), 1.0)
     repeats = 1.0 if isinstance(objective.family, Innovations) else objective.count / effective_samples(v)
-    return repeats * float(v @ v) / dof
+    return repeats * float(v @ v) / dof / objective.sensors
 
 
 def of_controller(objective: Objective, fit: Fit) -> Matrix:

@@ -228,6 +228,11 @@ class Objective:
         rows = self.whitened(self.errors(hypothesis, x[None, :]), noise, self.inertias(hypothesis, x[None, :]))
         return np.asarray(rows[0])
 
+    @property
+    def sensors(self) -> int:
+        """How many errors a sample has; a cost is their mean over the sensors."""
+        return 1
+
     def by_record(self, rows: Matrix) -> list[Matrix]:
         """Rows over v, summed over the sensors at each sample, as (samples, rows) of each record."""
         return np.split(rows.T, np.cumsum(self.lengths)[:-1])

@@ -162,6 +162,8 @@ def run(
     >>> round(float(answer.torque[0]), 6), round(float(answer.velocity[-1]), 2)
     (1.005, 20.0)
     """
+    if not isinstance(load, bool):
+        raise ModelError(f"load is {load!r}: give True or False")
     velocity, torque, angle = _simulated(model, rec, controller, initial_state, arithmetic, substeps)
     if angle is None:
         angle = _integrated(rec, velocity)

@@ -6,9 +6,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.signal import lfilter
 
 import gaident as ga
-from drive_rig import LoadSensor, Plant, rig, skip_without_library
+from drive_rig import LoadSensor, Noise, Plant, rig, skip_without_library
 
 skip_without_library()
 
@@ -69,7 +70,7 @@ def test_clean_records_stay_adequate() -> None:
 @pytest.mark.long
 def test_a_sensor_that_no_model_explains_is_said_and_changes_no_name() -> None:
     """A load encoder with an eccentric disc: 0.02 rad once per turn, which is no motion of the load."""
-    rec = log(BASE, {"coulomb_friction": {"torque": 0.1}}, POSITION)
+    rec = rig(BASE, COMMAND, {"coulomb_friction": {"torque": 0.1}}, seed=3, load_sensor=POSITION, position_logged=True)
     assert rec.load_position is not None
     turned = (rec.load_position - 2.0) / 0.1
     rec = rec.with_channels(load_position=rec.load_position + 0.1 * 0.02 * np.sin(turned))
@@ -77,6 +78,71 @@ def test_a_sensor_that_no_model_explains_is_said_and_changes_no_name() -> None:
     assert [(f.effect, f.sides) for f in dia.findings if f.effect == "coulomb_friction"] == [("coulomb_friction", ("motor",))]
     assert dia.verdict == "partly explained", dia.summary()
     assert any("load position is not explained" in note for note in dia.notes)
+
+
+@pytest.mark.long
+def test_a_late_sensor_is_no_fault_of_the_motor() -> None:
+    """The load's channel ten lines late: the model of the motor stands, and no signal of the motor is blamed."""
+    rec = log(BASE, {}, VELOCITY)
+    late = np.concatenate([np.full(10, rec.load_velocity[0]), rec.load_velocity[:-10]])  # type: ignore[index]
+    dia = ga.diagnose(rec.with_channels(load_velocity=late), BASE.controller)
+    assert not dia.findings and dia.driver is None and dia.verdict == "unexplained", dia.summary()
+    assert any("load velocity is not explained" in note and "late" in note for note in dia.notes)
+    assert dia.mechanics["inertia"].value == pytest.approx(BASE.J + BASE.JL, rel=0.01)
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("at", ["motor", "load"])
+def test_coloured_noise_of_either_sensor_is_noise(at: str) -> None:
+    rec = log(BASE, {}, POSITION)
+    colour = lfilter([np.sqrt(1.0 - 0.9**2)], [1.0, -0.9], np.random.default_rng(5).standard_normal(len(rec)))
+    if at == "motor":
+        rec = rec.with_channels(velocity=rec.velocity + 0.1 * colour)
+    else:
+        rec = rec.with_channels(load_position=rec.load_position + 2e-4 * colour)  # type: ignore[operator]
+    dia = ga.diagnose(rec, BASE.controller)
+    assert dia.verdict == "adequate" and not dia.findings, dia.summary()
+
+
+@pytest.mark.long
+def test_noise_of_a_measured_torque_is_no_motion_of_the_load() -> None:
+    rec = rig(BASE, COMMAND, {"coulomb_friction@load": {"torque": 0.1}}, seed=3, load_sensor=POSITION, position_logged=True)
+    assert rec.torque is not None
+    noise = 0.05 * float(np.sqrt(np.mean(rec.torque**2))) * np.random.default_rng(1).standard_normal(len(rec))
+    dia = ga.diagnose(rec.with_channels(command=None, torque=rec.torque + noise, torque_is="measured"), None)
+    assert {f.effect for f in dia.findings if f.named} == {"coulomb_friction"}, dia.summary()
+    assert any("load position is explained" in note for note in dia.notes), dia.notes
+
+
+@pytest.mark.long
+def test_outliers_of_the_load_s_sensor_are_left_out() -> None:
+    rec = log(BASE, {"coulomb_friction@load": {"torque": 0.1}}, POSITION)
+    spoiled = rec.load_position.copy()  # type: ignore[union-attr]
+    spoiled[[700, 1900]] += [0.5, -0.8]
+    dia = ga.diagnose(rec.with_channels(load_position=spoiled), BASE.controller)
+    (found,) = dia.findings
+    assert dia.verdict == "explained" and found.sides == ("load",), dia.summary()
+    assert dia.load_sensor["scale"].value == pytest.approx(0.1, abs=4.0 * dia.load_sensor["scale"].std)
+
+
+@pytest.mark.long
+def test_one_mass_becomes_two_where_the_load_shows_it() -> None:
+    """So much noise at the motor that its signals show one mass; the load's sensor shows the shaft."""
+    plant = replace(BASE, J=3e-3, JL=2e-4, KG=50.0, DG=0.02)
+    noisy = Noise(white=0.5)
+    rec = rig(plant, COMMAND, {}, noise=noisy, seed=3, load_sensor=replace(POSITION, noise=1e-5), position_logged=True)
+    alone, dia = (ga.diagnose(r, plant.controller) for r in (without_sensor(rec), rec))
+    assert "stiffness" not in alone.mechanics
+    assert dia.mechanics["stiffness"].value == pytest.approx(plant.KG, rel=0.02), dia.summary()
+
+
+@pytest.mark.long
+def test_a_channel_that_one_record_lacks_does_not_count_and_a_bootstrap_is_of_the_motor() -> None:
+    rec = log(BASE, {"coulomb_friction": {"torque": 0.1}}, VELOCITY)
+    dia = ga.diagnose([rec, without_sensor(log(BASE, {"coulomb_friction": {"torque": 0.1}}, VELOCITY))], BASE.controller)
+    assert dia.load_sensor == {} and any("load velocity does not count" in note for note in dia.notes)
+    drawn = ga.diagnose(rec, BASE.controller, bootstrap=2)
+    assert any("no p-value" in note for note in drawn.notes) and drawn.findings[0].p_value is None
 
 
 @pytest.mark.long

@@ -9,6 +9,7 @@ import pytest
 
 import gaident as ga
 from gaident.diagnosis.records.sizes import scales_of
+from gaident.estimation import least_squares as ls
 from gaident.estimation.dataset import DataSet
 from gaident.estimation.hypothesis import Hypothesis
 from gaident.estimation.load_sensor.joint import JointObjective
@@ -17,6 +18,7 @@ from gaident.estimation.noise_model import WHITE
 from gaident.estimation.objective import Objective
 from gaident.estimation.parameterisation import Parameterisation
 from gaident.estimation.prediction import OpenLoop
+from gaident.estimation.uncertainty import covariance_of
 
 DT, N = 1e-3, 1500
 DRIVE = ga.TwoMass(JM=1e-3, DM=1e-3, JL=2e-3, DL=1e-3, KG=80.0, DG=0.02)
@@ -38,8 +40,8 @@ def bench(rec: ga.Record) -> tuple[Objective, LoadSensor, Hypothesis, np.ndarray
     """The objective of the motor, the sensor, and the true drive as a hypothesis."""
     data = DataSet.of([rec], None)
     objective = Objective(data, np.ones(N))
-    sensor = LoadSensor.of(data, objective.counted)
-    assert sensor is not None
+    channel = "load_position" if rec.load_position is not None else "load_velocity"
+    sensor = LoadSensor.of(data, channel, [getattr(rec, channel)], objective.counted)
     parameters = Parameterisation.of(DRIVE.model(), scales_of(data), data.moving)
     return objective, sensor, Hypothesis(parameters, OpenLoop(data)), parameters.base_vector(DRIVE.model())
 
@@ -75,15 +77,6 @@ def test_an_angle_that_is_integrated_leaves_a_random_walk_which_is_whitened() ->
     assert logged.whitens is WHITE and logged.noise == pytest.approx(1e-5, rel=0.15)
 
 
-def test_of_two_channels_the_position_counts_and_a_constant_one_does_not() -> None:
-    rec = record("load_velocity", 1e-4)
-    both = rec.with_channels(load_position=record("load_position", 1e-4).load_position)
-    still = rec.with_channels(load_position=np.full(N, 2.0))
-    sensors = [LoadSensor.of(DataSet.of([r], None), np.ones(N)) for r in (both, still, rec)]
-    assert [None if s is None else s.channel for s in sensors] == ["load_position", "load_velocity", "load_velocity"]
-    assert LoadSensor.of(DataSet.of([rec, rec.with_channels(load_velocity=None)], None), np.ones(2 * N)) is None
-
-
 def test_one_mass_has_no_load_that_moves_against_the_motor() -> None:
     rec = record("load_position", 1e-4, position=True)
     _, sensor, _, _ = bench(rec)
@@ -101,11 +94,11 @@ def test_the_joint_cost_is_that_of_its_slopes_and_its_parts() -> None:
     joint = JointObjective.of(objective, sensor, start)
     v, J = joint.linearised(truth, x, WHITE)
     cost = float(joint.costs(truth, x[None, :], WHITE)[0])
-    at_load = float(np.sum(sensor.errors(truth, x[None, :])[0] ** 2))
-    assert cost == pytest.approx(float(v @ v), rel=1e-12) == pytest.approx(start.cost + joint.share * at_load, rel=1e-12)
-    assert len(v) == 2 * N == J.shape[1] and joint.count == objective.count + sensor.count
-    np.testing.assert_array_equal(joint.whitened_at(truth, x, WHITE), v)
     fit = joint.fitted(truth, x, WHITE, cost)
+    at_load = joint.at_load(fit) * sensor.count
+    assert cost == pytest.approx(float(v @ v), rel=1e-12) == pytest.approx(0.5 * (start.cost + joint.share * at_load), rel=1e-12)
+    assert len(v) == 2 * N == J.shape[1] and joint.count == objective.count and joint.sensors == 2
+    np.testing.assert_array_equal(joint.whitened_at(truth, x, WHITE), v)
     parts = objective.bic(start.cost, WHITE, truth.parameters.size) + joint.samples * np.log(joint.at_load(fit))
     assert fit.bic == pytest.approx(parts, rel=1e-9)
     moved = np.flatnonzero(truth.parameters.steps() > 0.0)
@@ -116,6 +109,20 @@ def test_the_joint_cost_is_that_of_its_slopes_and_its_parts() -> None:
         assert np.linalg.norm(J[i] - slope) < 1e-3 * np.linalg.norm(slope)
 
 
+def test_the_motor_s_noise_does_not_count_twice() -> None:
+    """Beside the errors of the motor those at the load are the noise of their own sensor, and tell nothing of the motor's."""
+    objective, sensor, truth, x = bench(record("load_velocity", 1e-3, motor_noise=0.05))
+    start = objective.fitted(truth, x, WHITE, float(objective.costs(truth, x[None, :], WHITE)[0]))
+    joint = JointObjective.of(objective, sensor, start)
+    alone = sensor.errors(truth, x[None, :])[0]
+    v = joint.whitened_at(truth, x, WHITE)
+    at_motor, at_load = np.sqrt(2.0) * v[:N], np.sqrt(2.0 / joint.share) * v[N:]
+    assert float(np.std(alone)) == pytest.approx(abs(SCALE) * 0.05, rel=0.1)
+    assert abs(float(np.corrcoef(at_motor, alone)[0, 1])) > 0.9
+    assert float(np.std(at_load)) == pytest.approx(1e-3, rel=0.1)
+    assert abs(float(np.corrcoef(at_motor, at_load)[0, 1])) < 0.1
+
+
 def test_the_motor_alone_is_what_it_was() -> None:
     objective, sensor, truth, x = bench(record("load_velocity", 1e-3, motor_noise=0.02))
     start = objective.fitted(truth, x, WHITE, float(objective.costs(truth, x[None, :], WHITE)[0]))
@@ -124,3 +131,29 @@ def test_the_motor_alone_is_what_it_was() -> None:
     assert alone is objective and fit.bic <= objective.fitted(truth, x, WHITE, start.cost).bic + 1e-9
     half = np.repeat([1.0, 0.0], N // 2)
     assert joint.weighted(half).count == pytest.approx(joint.count / 2.0, rel=0.05)
+    assert joint.weighted(half).sensor.count == pytest.approx(sensor.count / 2.0, rel=0.05)
+
+
+@pytest.mark.long
+def test_deviations_of_the_drive_are_those_of_repeats() -> None:
+    """The stiffness from 60 draws of the noise, where the motor's is in both errors; it is said with their spread."""
+    found, said = [], []
+    for k in range(60):
+        rng, rec = np.random.default_rng(k), record("load_velocity", 0.0)
+        noise = 0.05 * rng.standard_normal(N)
+        at_load = rec.load_velocity + 5e-4 * rng.standard_normal(N)
+        objective, sensor, truth, x = bench(rec.with_channels(velocity=rec.velocity + noise, load_velocity=at_load))
+        fit = ls.fit(objective, truth, x, WHITE, 10)
+        for _ in range(2):
+            joint = JointObjective.of(objective, sensor, ls.fit(objective, truth, fit.x, WHITE, 0))
+            fit = ls.fit(joint, truth, fit.x, WHITE, 20)
+        slope = [stiffness(fit.parameters, fit.x + h) for h in 1e-6 * np.eye(len(x))]
+        slope = (np.array(slope) - stiffness(fit.parameters, fit.x)) / 1e-6
+        found.append(stiffness(fit.parameters, fit.x))
+        said.append(float(np.sqrt(slope @ covariance_of(joint, fit) @ slope)))
+    assert float(np.std(found)) == pytest.approx(float(np.median(said)), rel=0.3)
+    assert float(np.mean(found)) == pytest.approx(DRIVE.KG, abs=4.0 * float(np.std(found)) / np.sqrt(60))
+
+
+def stiffness(parameters: Parameterisation, x: np.ndarray) -> float:
+    return ga.TwoMass.from_model(parameters.linear(x), free_shaft_damping=True).KG

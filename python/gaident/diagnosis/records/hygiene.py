@@ -110,6 +110,13 @@ def cleaned(rec: Record, hit: NDArray[np.intp]) -> Record:
     return rec.with_channels(velocity=w)
 
 
+def cleaned_signal(signal: Vector, hit: NDArray[np.intp]) -> Vector:
+    """Another signal with interpolated values in place of outliers."""
+    cleaned = signal.copy()
+    _interpolate(cleaned, hit)
+    return cleaned
+
+
 def left_unexplained(records: Sequence[Record], of_log: Sequence[NDArray[np.intp]], missing: Vector, weight: Vector) -> int:
     """Number of outliers of the log, and of samples that the model found does not follow.
 

@@ -392,7 +392,9 @@ def beside_load(selection: Selection, sensor: LoadSensor, classes: Classes, note
         same, final = space.key(found) == space.key(final), found
         if same:
             break
-    return _compared(_Found(space, selection.base, final), classes, note)
+    space = LoadMoves.beside(selection.space, sensor, final)
+    final = space.refitted(final.hypothesis, final.x)
+    return _compared(_Found(space, selection.base, final, selection.specification), classes, note)
 
 
 def compared(selection: Selection, final: Fit, classes: Classes, note: Callable[[str], None]) -> Selection:

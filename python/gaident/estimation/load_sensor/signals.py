@@ -4,7 +4,7 @@
 
 theta: angle of the motor as measured; theta_L: of the simulated load; theta_M: of the simulated motor as it would be measured.
 For one mass theta_L is theta_M.
-So only how the load follows counts: what disturbs motor and load together is in neither side.
+So only how the load follows counts, and not what turns motor and load alike.
 Where the motor's angle is the integral of its measured velocity, theta_M is the same sum over the simulated velocity.
 Scale s and offset o, one of each record, are least squares of each model (separable least squares; Golub and Pereyra, SIAM
 J. Numer. Anal. 10(2):413-432, 1973).
@@ -20,6 +20,7 @@ Assoc. 55:299-306, 1960).
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
@@ -67,15 +68,11 @@ class LoadSensor:
     noise: float  # standard deviation of the whitened noise, in the sensor's own unit
 
     @classmethod
-    def of(cls, data: DataSet, used: Vector) -> LoadSensor | None:
-        """Of records that all have one of the channels; else None. used: (n,), 0 for samples that are left out."""
-        for channel in CHANNELS:
-            signals = [s for s in (getattr(r, channel) for r in data.records) if s is not None and np.ptp(s) > 0.0]
-            if len(signals) == len(data.records):
-                motor = data.angle if channel == CHANNELS[0] else data.velocity
-                plain = cls(channel, np.concatenate(signals), motor, data.lengths, used, WHITE, 0.0)
-                return plain._with_noise(data, float(np.mean([noise_std(s) for s in signals])))
-        return None
+    def of(cls, data: DataSet, channel: str, signals: Sequence[Vector], used: Vector) -> LoadSensor:
+        """Of one channel of all records. used: (n,), 0 for samples that are left out."""
+        motor = data.angle if channel == CHANNELS[0] else data.velocity
+        plain = cls(channel, np.concatenate(signals), motor, data.lengths, used, WHITE, 0.0)
+        return plain._with_noise(data, float(np.mean([noise_std(s) for s in signals])))
 
     def _with_noise(self, data: DataSet, own: float) -> LoadSensor:
         """own: standard deviation of the sensor's noise, as its third differences show it."""
@@ -92,9 +89,7 @@ class LoadSensor:
         own = max(own, ROUNDING * walk)
         r = (walk / own) ** 2
         c = 1.0 + 0.5 * r - float(np.sqrt(r + 0.25 * r**2))  # no decision: a formula
-        return replace(
-            self, whitens=NoiseFilter(np.array([1.0, -1.0]), np.array([1.0, -c]), 1), noise=max(own, 1e-6 * walk) / np.sqrt(c)
-        )
+        return replace(self, whitens=NoiseFilter(np.array([1.0, -1.0]), np.array([1.0, -c]), 1), noise=own / np.sqrt(c))
 
     @property
     def count(self) -> float:
@@ -125,14 +120,18 @@ class LoadSensor:
             angles[:, first + 1 : end] = np.cumsum(0.5 * dt * (part[:, 1:] + part[:, :-1]), axis=1)
         return angles
 
-    def errors(self, hypothesis: Hypothesis, X: Matrix) -> Matrix:
-        """Rows of whitened errors in the sensor's unit, with the best scale and offsets of each; 0 where samples do not count."""
-        Z = self._free(self.motor + self.follows(hypothesis, X))
-        y = self._free(self.measured[None, :])[0]
-        power = np.sum(Z**2, axis=1)
+    def errors(self, hypothesis: Hypothesis, X: Matrix, told: Matrix | None = None) -> Matrix:
+        """Rows of whitened errors in the sensor's unit, with the best scale and offsets of each; 0 where samples do not count.
+
+        told: rows of what else is known of them, which is taken away.
+        """
+        Z, Y = self._free(self.motor + self.follows(hypothesis, X)), self._free(self.measured[None, :])
+        if told is not None:
+            Y = Y - self._beside_constants(told * self.used)
         with np.errstate(invalid="ignore", over="ignore"):
-            scales = np.divide(Z @ y, power, out=np.zeros(len(Z)), where=power > 0.0)
-            return np.asarray(y - scales[:, None] * Z)
+            power = np.sum(Z**2, axis=1)
+            scales = np.divide(np.sum(Z * Y, axis=1), power, out=np.zeros(len(Z)), where=power > 0.0)
+            return np.asarray(Y - scales[:, None] * Z)
 
     def reading(self, hypothesis: Hypothesis, x: Vector) -> LoadReading:
         """How it reads the load of one model."""
@@ -159,7 +158,13 @@ class LoadSensor:
     def _basis(self) -> Matrix:
         return orthonormal_rows(self._constants)
 
+    def of_rates(self, rows: Matrix, dt: float) -> Matrix:
+        """Rows of the load's velocity less the motor's as this sensor shows them, with scale 1, behind its filter."""
+        return self._free(rows if self.channel != CHANNELS[0] else self._integrated(rows, dt))
+
     def _free(self, rows: Matrix) -> Matrix:
         """Rows behind the filter, without what constants of the records explain."""
-        rows = self._filtered(rows)
+        return self._beside_constants(self._filtered(rows))
+
+    def _beside_constants(self, rows: Matrix) -> Matrix:
         return np.asarray(rows - (rows @ self._basis.T) @ self._basis)
