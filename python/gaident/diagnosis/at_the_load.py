@@ -10,8 +10,9 @@ from gaident.axis import Text, say
 from gaident.diagnosis.records.hygiene import cleaned_signal, outliers
 from gaident.diagnosis.selection.load_moves import LoadMoves
 from gaident.diagnosis.selection.rivals import Classes
-from gaident.diagnosis.selection.select import Selection, beside_load
+from gaident.diagnosis.selection.select import Selection, grown, with_rivals
 from gaident.estimation.load_sensor.signals import CHANNELS, LoadSensor
+from gaident.policy.table import POLICY
 from gaident.results.estimate import Estimate
 
 __all__ = ["explains_load", "load_numbers", "load_words", "with_load_sensor"]
@@ -31,7 +32,22 @@ def with_load_sensor(found: Selection, classes: Classes, note: Callable[[str], N
     used = objective.counted.copy()
     used[np.concatenate([np.isin(np.arange(len(s)), h) for s, h in zip(signals, hit, strict=True)])] = 0.0
     cleaned = [cleaned_signal(s, h) for s, h in zip(signals, hit, strict=True)]
-    return beside_load(found, LoadSensor.of(objective.data, channel, cleaned, used), classes, note)
+    return _beside_load(found, LoadSensor.of(objective.data, channel, cleaned, used), classes, note)
+
+
+def _beside_load(selection: Selection, sensor: LoadSensor, classes: Classes, note: Callable[[str], None]) -> Selection:
+    """The selection once more from its model, with a sensor of the load, weighed by what the model before left there."""
+    note("looking at the load's sensor")
+    final = selection.final
+    for _ in range(POLICY.rounds):
+        space = LoadMoves.beside(selection.space, sensor, final)
+        found = grown(space, space.refitted(final.hypothesis, final.x))
+        same, final = space.key(found) == space.key(final), found
+        if same:
+            break
+    space = LoadMoves.beside(selection.space, sensor, final)
+    final = space.refitted(final.hypothesis, final.x)
+    return with_rivals(space, selection, final, classes, note)
 
 
 def _moves(signal: np.ndarray | None) -> bool:

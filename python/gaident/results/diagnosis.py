@@ -113,8 +113,8 @@ class Diagnosis(WhatIf):
     mechanics : mapping of str to Estimate
         Mechanical parameters of the linear part, fitted together with the effects.
     load_sensor : mapping of str to Estimate
-        How a sensor at the load reads it: "scale" of its signal over the load's motion, and "offset", in the record's unit, of the
-        first record where there are several; {} without one.
+        How a sensor at the load reads it: "scale" of its signal over the load's motion, and "offset" in the record's unit.
+        Of several records the offset is that of the first; {} without a sensor.
     not_there : mapping of str to Bound
         Effect that was tested and not found -> how large it may be at most; {} where something significant is left, in files of
         gaident 0.1.0, and of more than 65 536 samples.

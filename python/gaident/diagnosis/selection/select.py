@@ -31,21 +31,19 @@ from gaident.diagnosis.selection.bases import (
 from gaident.diagnosis.selection.beam import Beam
 from gaident.diagnosis.selection.beam import reduced as reduced_by
 from gaident.diagnosis.selection.decimated import blocks_of, decimated_objective, moved
-from gaident.diagnosis.selection.load_moves import LoadMoves
 from gaident.diagnosis.selection.mechanisms import drives_itself, on_no_shaft, resonance, swings
 from gaident.diagnosis.selection.model_space import words
 from gaident.diagnosis.selection.moves import Moves
 from gaident.diagnosis.selection.rivals import Classes, Replacement, of_each_effect
 from gaident.estimation import least_squares as ls
 from gaident.estimation.criterion import Specification, effective_samples
-from gaident.estimation.load_sensor.signals import LoadSensor
 from gaident.estimation.noise_model import WHITE, ShaftNoise
 from gaident.estimation.objective import Fit, Innovations, Objective, OutputErrors
 from gaident.estimation.term import Scales, Term
 from gaident.models.model import Model
 from gaident.policy.table import POLICY
 
-__all__ = ["Selection", "beside_load", "by_whitened_errors", "compared", "selected", "specification"]
+__all__ = ["Selection", "by_whitened_errors", "compared", "grown", "selected", "specification", "with_rivals"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -155,7 +153,7 @@ def _decided(task: Task, note: Callable[[str], None]) -> _Found:
             return replace(by_output, specification=test)
     if again is not None and again.effects and space.is_noise(again) and space.small_unwhitened(again):
         # It leaves noise: no other explanation of the same is searched, only effects that this model may lack.
-        final = _grown(space, again)
+        final = grown(space, again)
         base = space.bare(final)
     else:
         base, final = _explored(task, space, bases)
@@ -198,7 +196,7 @@ def _by_output_errors(output: ByOutputErrors, bases: Sequence[Fit], note: Callab
     space = task.space()
     rigid = None if axis is None else task.objective.rescored(axis)
     if rigid is not None and rigid.effects and space.quiet(rigid) and space.small_unwhitened(rigid):
-        final = _grown(space, rigid)
+        final = grown(space, rigid)
         return _Found(space, space.bare(final), final)
     bases = [task.objective.rescored(f) for f in starts]
     base, final = _explored(task, space, bases)
@@ -288,7 +286,7 @@ def _reductions(space: Moves) -> tuple[Callable[[Fit], list[Fit]], ...]:
     return space.close, space.exchange, space.other_wave, space.other_side, space.drop, space.simplify, space.demote
 
 
-def _grown(space: Moves, fit: Fit) -> Fit:
+def grown(space: Moves, fit: Fit) -> Fit:
     """What the beam search makes of a model, reduced first."""
     return _beam(space).run([reduced_by(fit, _reductions(space), space.prefers, space.score)])
 
@@ -298,7 +296,7 @@ def _improved(space: Moves, other: Fit, best: Fit) -> Fit:
     worse = space.rank(best)[:2] <= space.rank(other)[:2] and space.score(other) > space.score(best) + space.penalty
     if worse or space.leaves_the_shaft(other, best):
         return best
-    other = _grown(space, other)
+    other = grown(space, other)
     if space.rank(other)[:2] != space.rank(best)[:2]:
         return min(other, best, key=space.rank)
     return other if space.score(best) - space.score(other) > space.policy.swap else best
@@ -382,19 +380,9 @@ def by_whitened_errors(selection: Selection, classes: Classes, note: Callable[[s
     return None if selection.whitened is None else _compared(selection.whitened, classes, note)
 
 
-def beside_load(selection: Selection, sensor: LoadSensor, classes: Classes, note: Callable[[str], None]) -> Selection:
-    """The selection once more from its model, with a sensor of the load, weighed by what the model before left there."""
-    note("looking at the load's sensor")
-    final = selection.final
-    for _ in range(POLICY.rounds):
-        space = LoadMoves.beside(selection.space, sensor, final)
-        found = _grown(space, space.refitted(final.hypothesis, final.x))
-        same, final = space.key(found) == space.key(final), found
-        if same:
-            break
-    space = LoadMoves.beside(selection.space, sensor, final)
-    final = space.refitted(final.hypothesis, final.x)
-    return _compared(_Found(space, selection.base, final, selection.specification), classes, note)
+def with_rivals(space: Moves, like: Selection, final: Fit, classes: Classes, note: Callable[[str], None]) -> Selection:
+    """The selection of another space and model in the place of one, compared with its rivals as any is."""
+    return _compared(_Found(space, like.base, final, like.specification), classes, note)
 
 
 def compared(selection: Selection, final: Fit, classes: Classes, note: Callable[[str], None]) -> Selection:
