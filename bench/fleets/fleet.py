@@ -74,8 +74,8 @@ def write_log(path: Path, friction: float, seed: int) -> None:
 
 def written(path: Path, rec: ga.Record) -> None:
     path.parent.mkdir(parents=True, exist_ok=True)
-    table = np.column_stack([rec.time, rec.command, rec.velocity, rec.torque])
-    np.savetxt(path, table, delimiter=",", header="time,command,velocity,torque", comments="")
+    table = zip(rec.time.tolist(), rec.command.tolist(), rec.velocity.tolist(), rec.torque.tolist(), strict=True)
+    path.write_text("time,command,velocity,torque\n" + "".join(f"{t!r},{r!r},{w!r},{u!r}\n" for t, r, w, u in table))
 
 
 def drives(count: int, workers: int) -> None:
