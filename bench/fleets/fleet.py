@@ -111,14 +111,16 @@ def speed(count: int, method: str, seconds: float) -> None:
     """The same logs by single calls in this process, and by ga.fleet with 1 and 2 processes; memory of the parent.
 
     Logs of so many seconds, on one core each; DRAWN of them are simulated, the others are these with more noise, no two alike.
-    At most DRAWN of them are called singly.
+    Some DRAWN of them are called singly, before and after each run: machines are noisy.
     """
     controller = ga.PI(PLANT.kp, PLANT.ki)
 
-    def call(log: Path) -> object:
-        if method == "identify":
-            return ga.identify(ga.read(log), controller, workers=1)
-        return ga.diagnose(ga.read(log), controller, quick=True)
+    def call(log: Path, saved: bool = False) -> None:
+        rec = ga.read(log)
+        identified = method == "identify"
+        found = ga.identify(rec, controller, workers=1) if identified else ga.diagnose(rec, controller, quick=True)
+        if saved:
+            found.save(log.with_suffix(".json"))
 
     with tempfile.TemporaryDirectory() as folder:
         logs = [Path(folder) / "logs" / f"axis{k % 20:02d}" / f"{k:05d}.csv" for k in range(count)]
@@ -130,17 +132,25 @@ def speed(count: int, method: str, seconds: float) -> None:
             more = 0.0 if k < len(drawn) else 0.01 * np.random.default_rng(k).standard_normal(len(rec))
             written(log, rec.with_channels(velocity=rec.velocity + more))
         call(logs[0])
-        began = time.perf_counter()
-        for log in logs[:DRAWN]:
-            call(log)
-        single = min(count, DRAWN) / (time.perf_counter() - began)
-        print(f"{count} logs of {len(long)} samples, {method}; single calls: {single:.3f} logs/s", flush=True)
+
+        def singly(when: str) -> None:
+            some, rates = logs[:: max(count // DRAWN, 1)], []
+            for saved in (False, True):
+                began = time.perf_counter()
+                for log in some:
+                    call(log, saved)
+                rates.append(len(some) / (time.perf_counter() - began))
+            print(f"single calls {when}: {rates[0]:.3f} logs/s, {rates[1]:.3f} with the result saved", flush=True)
+
+        print(f"{count} logs of {len(long)} samples, {method}")
+        singly("before")
         for workers in (1, 2):
             code = f"import bench_speed as b; b.run({folder!r}, {workers}, {method!r})"
             script = Path(folder) / "bench_speed.py"
             script.write_text(RUN)
             again = subprocess.run([sys.executable, "-c", code], cwd=folder, capture_output=True, text=True, check=True)
             print(again.stdout.strip(), flush=True)
+            singly(f"after {workers}")
 
 
 RUN = f"""
