@@ -130,9 +130,10 @@ WHEEL_TESTS := $(addprefix tests/python/,models/test_simulate.py data/test_recor
 	cli/test_no_pictures.py trust/test_files.py)
 WITHOUT_COMPILER = env -u GAIDENT_DATA PATH="$(abspath $(WHEEL)/bare/bin)"
 
-wheel: .venv/.released ## this machine's wheel, installed and tried in an empty environment without a compiler
+# From the objects of `test`, as `bare`.
+wheel: .venv/.tested .venv/.released ## this machine's wheel, installed and tried in an empty environment without a compiler
 	@rm -rf $(WHEEL) && mkdir -p $(WHEEL)/out
-	$(BIN)/python -m pip wheel --quiet --no-deps $(PACKAGE) --wheel-dir $(WHEEL)/built .
+	$(BIN)/python -m pip wheel --quiet --no-deps $(CHECKED) --wheel-dir $(WHEEL)/built .
 	PATH="$(abspath $(BIN)):$$PATH" $(BIN)/auditwheel repair --wheel-dir $(WHEEL)/repaired $(WHEEL)/built/*.whl
 	$(BIN)/python -m twine check --strict $(WHEEL)/repaired/*.whl
 	$(PYTHON) -m venv $(WHEEL)/bare
