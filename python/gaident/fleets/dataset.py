@@ -14,9 +14,11 @@ from gaident.errors import GaidentError, ReadError
 from gaident.files import write_whole
 from gaident.fleets.rows import LOG_COLUMNS, PARAMETER_COLUMNS
 
-__all__ = ["FORMATS", "TABLES", "best_format", "part_file", "parts_of", "read_part", "remove_part", "write_part"]
+__all__ = ["FORMATS", "INDEX", "TABLES", "best_format", "part_file", "parts_of", "read_part", "remove_part", "write_part"]
 
 FORMATS = ("parquet", "csv")
+INDEX = "index.sqlite"
+"""The file beside the tables that says which results are there."""
 TABLES = {"logs": LOG_COLUMNS, "parameters": PARAMETER_COLUMNS}
 
 Row = Mapping[str, Any]
@@ -65,9 +67,10 @@ def _parquet(columns: Mapping[str, type], rows: list[Row]) -> bytes:
         else:
             arrays.append(pyarrow.array(values, kinds[kind]))
         fields.append(pyarrow.field(name, arrays[-1].type))
-    out = io.BytesIO()
+    # A stream of pyarrow's own, as in `read_part`: its threads must hold no object of Python when the interpreter ends.
+    out = pyarrow.BufferOutputStream()
     files.write_table(pyarrow.Table.from_arrays(arrays, schema=pyarrow.schema(fields)), out)
-    return out.getvalue()
+    return bytes(out.getvalue().to_pybytes())
 
 
 def _csv(first: Row, columns: Mapping[str, type], rows: Iterable[Row]) -> bytes:
@@ -91,6 +94,9 @@ def parts_of(folder: Path, table: str) -> Iterator[tuple[str, str, Path]]:
     """(axis, month, file) of a table, by their names. Raises ReadError where there is none."""
     found = sorted(f for f in (folder / table).glob("axis=*/month=*/part.*") if f.suffix[1:] in FORMATS)
     if not found:
+        if (folder / INDEX).is_file():
+            text = "the fleet was stopped before its tables were written; call gaident fleet again, which goes on where it was"
+            raise ReadError(f"{folder}: {text}")
         raise ReadError(f"{folder}: there is no table {table!r} of a fleet; give the folder that gaident fleet wrote with --out")
     for file in found:
         axis, month = (unquote(part.partition("=")[2]) for part in file.parts[-3:-1])
@@ -102,11 +108,11 @@ def read_part(file: Path, table: str) -> list[dict[str, Any]]:
     columns = TABLES[table]
     try:
         if file.suffix[1:] == FORMATS[0]:
-            _pyarrow()
+            pyarrow = _pyarrow()
             import pyarrow.parquet as files
 
-            with open(file, "rb") as stream:
-                rows = files.read_table(stream).to_pylist()
+            with pyarrow.OSFile(str(file)) as stream, files.ParquetFile(stream, pre_buffer=False) as opened:
+                rows = opened.read(use_threads=False).to_pylist()
             return [{**row, "time": row["time"].isoformat()} for row in rows]
         with open(file, encoding="utf-8", newline="") as stream:
             return [{name: _value(row[name], kind) for name, kind in columns.items()} for row in csv.DictReader(stream)]

@@ -200,6 +200,12 @@ class Trends:
         """The courses that say nothing of changes, each with why."""
         return tuple(course for course in self.courses if course.poor)
 
+    @property
+    def nothing_to_say(self) -> str:
+        """A sentence where no course says anything of changes, with the first reason; else ""."""
+        none = bool(self.courses) and len(self.poor) == len(self.courses)
+        return f"Nothing can be said of changes yet: {self.poor[0].poor}." if none else ""
+
     def summary(self) -> str:
         """Return the changes, the axes that differ from their siblings, and what is too poor to say."""
         failed = sum(a.failed for a in self.axes)
@@ -209,7 +215,7 @@ class Trends:
             rows += [_change_row(c) for c in self.changes]
             lines += ["Changes", *table(rows, "  ")]
         else:
-            lines.append("No changes.")
+            lines.append(self.nothing_to_say or "No changes.")
         if self.siblings:
             apart: list[tuple[str, ...]] = [("axis", "what differs", "value", "middle of all axes", "", "spreads away")]
             apart += [
@@ -217,7 +223,7 @@ class Trends:
             ]
             lines += ["", "Axes that differ from their siblings", *table(apart, "  ")]
         if self.poor:
-            lines += ["", f"Too poor to say: {len(self.poor)} of {len(self.courses)} courses"]
+            lines += ["", f"Too poor to say: {len(self.poor)} of {len(self.courses)} courses ({self.poor[0].poor})"]
         return "\n".join(lines)
 
 

@@ -16,6 +16,7 @@ from typing import Any
 
 from gaident.errors import GaidentError
 from gaident.files import lock_alone
+from gaident.fleets.dataset import INDEX
 from gaident.fleets.task import Outcome, shown
 
 __all__ = ["Index", "opened", "result_path"]
@@ -51,7 +52,7 @@ class Index:
     """Logs with their axis, time and key, results by their key, and the parts of the dataset that are to be written again."""
 
     def __init__(self, folder: Path) -> None:
-        self.path = folder / "index.sqlite"
+        self.path = folder / INDEX
         self.base = sqlite3.connect(self.path)
         self.base.execute("PRAGMA journal_mode=WAL")
         self.base.execute("PRAGMA synchronous=NORMAL")
@@ -211,7 +212,7 @@ def opened(folder: Path) -> Iterator[Index]:
         try:
             index = Index(folder)
         except sqlite3.DatabaseError as error:
-            raise GaidentError(DAMAGED.format(folder / "index.sqlite", error)) from error
+            raise GaidentError(DAMAGED.format(folder / INDEX, error)) from error
         try:
             yield index
         finally:

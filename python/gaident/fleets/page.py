@@ -86,6 +86,7 @@ def write_page(found: Trends, folder: Path, target: Path, reports: bool) -> None
         )
         for a in found.axes
     ]
+    parts += [f"<p>{escape(found.nothing_to_say)}</p>"] * bool(found.nothing_to_say)
     parts += ["<h2>Axes</h2>", _table(heads, rows)]
     if found.changes:
         heads = ("axis", "what changed", "since", "seen on", "from", "to", "unit", "change [%]", "+- [%]")

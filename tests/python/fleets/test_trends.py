@@ -12,9 +12,10 @@ import pytest
 
 import gaident as ga
 from gaident.cli import main
+from gaident.errors import ReadError
 from gaident.fleets.changes import Scale, shifts_of
 from gaident.fleets.courses import logs_a_year
-from gaident.fleets.dataset import best_format, write_part
+from gaident.fleets.dataset import INDEX, best_format, read_part, write_part
 
 DAYS = 90
 BEGIN = datetime(2026, 1, 1)
@@ -202,3 +203,39 @@ def test_the_command_says_the_same(fleet_of_seven: Path, capsys: pytest.CaptureF
     assert [c["axis"] for c in said["changes"]] == ["axis 3"] and said["poor"][0]["axis"] == "<b>odd</b>"
     assert main(["trends", str(fleet_of_seven)]) == 0
     assert "Axes that differ from their siblings" in capsys.readouterr().out
+
+
+def test_where_nothing_can_be_said_that_comes_first(tmp_path: Path) -> None:
+    """Eight logs of an axis whose inertia steps by a third are too few: the reason stands in place of "No changes."."""
+    out = tmp_path / "fleet"
+    write_course(out, "gate", noisy(1.0, 3, 8) * np.where(np.arange(8) >= 4, 1.3, 1.0))
+    found = ga.trends(out, tmp_path / "page.html")
+    assert found.nothing_to_say.startswith("Nothing can be said of changes yet: only 8 usable logs; a change shows from ")
+    assert found.nothing_to_say in found.summary() and "No changes." not in found.summary()
+    assert found.nothing_to_say in (tmp_path / "page.html").read_text()
+
+
+def test_a_fleet_that_was_stopped_says_what_to_do(tmp_path: Path) -> None:
+    (tmp_path / INDEX).write_bytes(b"")
+    with pytest.raises(ReadError, match="stopped before its tables were written; call gaident fleet again"):
+        ga.trends(tmp_path)
+
+
+@pytest.mark.skipif(best_format() == "csv", reason="pyarrow is not installed: pip install 'gaident[parquet]'")
+def test_tables_are_read_and_written_by_streams_of_pyarrow_alone(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Its threads may outlive the interpreter: one that then drops an object of Python ended the process with "Aborted"."""
+    import pyarrow.parquet
+
+    given: list[object] = []
+    for name, place in (("write_table", 1), ("ParquetFile", 0)):
+        usual = getattr(pyarrow.parquet, name)
+
+        def noting(*args: Any, usual: Any = usual, place: int = place, **more: Any) -> Any:
+            given.append(args[place])
+            return usual(*args, **more)
+
+        monkeypatch.setattr(pyarrow.parquet, name, noting)
+    write_course(tmp_path, "gate", noisy(1.0, 3, 3))
+    assert len(read_part(next((tmp_path / "logs").glob("*/*/part.parquet")), "logs")) == 3
+    assert len(given) >= 2 and all(isinstance(stream, pyarrow.NativeFile) for stream in given)
+    assert {type(stream).__name__ for stream in given} == {"BufferOutputStream", "OSFile"}

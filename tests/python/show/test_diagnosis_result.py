@@ -129,6 +129,7 @@ def fake() -> Any:
         torque_logged=True,
         loop_follows=True,
         line=(37.0, 0.0512),
+        load_sensor={},
         mechanics={
             "inertia": ga.Estimate(6.88e-4, 1.2e-6, "kg m^2"),
             "viscous_friction": ga.Estimate(0.011, 0.0002, "N m s/rad"),

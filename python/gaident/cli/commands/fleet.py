@@ -37,6 +37,9 @@ def fleet_command(args: Namespace) -> int:
         print_json({"schema": "gaident/fleet", "schema_version": 1, **asdict(found)})
     else:
         print(found.summary())
-        for row in found.first_failed():
+        told = found.first_failed()
+        for row in told:
             print(f"  failed: {row}")
+        if found.failed > len(told) > 0:
+            print(f"  and {found.failed - len(told)} more")
     return 0 if found.done else 1
