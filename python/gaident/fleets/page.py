@@ -126,7 +126,7 @@ def _reports(found: Trends, folder: Path, target: Path) -> dict[str, str]:
     wanted = {a.log for a in found.axes if a.log} | {c.log for c in found.changes}
     beside = target.with_name(f"{target.stem}_reports")
     links: dict[str, str] = {}
-    for _, _, file in parts_of(folder, "logs"):
+    for axis, _, file in parts_of(folder, "logs"):
         for row in read_part(file, "logs"):
             if row["log"] not in wanted or not row["result"]:
                 continue
@@ -137,7 +137,8 @@ def _reports(found: Trends, folder: Path, target: Path) -> dict[str, str]:
             if isinstance(result, (Diagnosis, Identification)):
                 beside.mkdir(exist_ok=True)
                 name = f"{Path(row['result']).stem}.html"
-                write_whole(beside / name, report_page(result, axis=row["kind"], live=False).encode())
+                about = {"axis": axis, "log": row["log"], "time": row["time"].replace("T", " ")}
+                write_whole(beside / name, report_page(result, axis=row["kind"], about=about, live=False).encode())
                 links[row["log"]] = f"{quote(beside.name)}/{name}"
     return links
 

@@ -159,6 +159,8 @@ def test_a_name_that_is_not_utf_8_is_a_log_like_others(tmp_path: Path, monkeypat
     failed = rows["logs/x\\xff/2026-01-02\\xe9.csv"]
     assert failed["status"] == "failed" and failed["error"].encode()
     ga.trends("out", "page.html")
+    (report,) = Path("page_reports").iterdir()  # it says whose it is
+    assert "logs/x\\xff/2026-01-01\\xe9.csv" in report.read_text()
 
 
 def test_a_killed_run_goes_on_to_the_same_dataset(inside: Path) -> None:
