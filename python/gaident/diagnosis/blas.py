@@ -5,6 +5,7 @@ from __future__ import annotations
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
+from functools import cache
 from typing import Any
 
 __all__ = ["one_thread"]
@@ -23,12 +24,9 @@ def one_thread() -> Iterator[None]:
     Of two that overlap, each by itself would give back what the other had set.
     """
     global _INSIDE, _LIMIT
-    import scipy.linalg  # noqa: F401  brings a BLAS of its own, to be limited too
-    from threadpoolctl import threadpool_limits
-
     with _LOCK:
         if _INSIDE == 0:
-            _LIMIT = threadpool_limits(1, user_api="blas")
+            _LIMIT = _libraries().limit(limits=1, user_api="blas")
         _INSIDE += 1
     try:
         yield
@@ -38,3 +36,12 @@ def one_thread() -> Iterator[None]:
             if _INSIDE == 0:
                 _LIMIT.restore_original_limits()
                 _LIMIT = None
+
+
+@cache
+def _libraries() -> Any:
+    """Those of NumPy and SciPy, which make all sums here; looked for once in a process, as that takes milliseconds."""
+    import scipy.linalg  # noqa: F401  brings a BLAS of its own, to be limited too
+    from threadpoolctl import ThreadpoolController
+
+    return ThreadpoolController()
