@@ -35,7 +35,7 @@ SOURCES := pyproject.toml CMakeLists.txt LICENSE README.md \
 ifndef SIDE_BY_SIDE
 .NOTPARALLEL:
 endif
-.PHONY: help install demo test fuzz bench real bare oldest embedded wasm try wheel windows tidy docs lint test-cpp test-python test-long clean build-checked test-checked test-sanitized
+.PHONY: help install demo test fuzz bench real bare oldest embedded wasm try wheel windows arm64 tidy docs lint test-cpp test-python test-long clean build-checked test-checked test-sanitized
 .DEFAULT_GOAL := help
 
 help: ## list the commands
@@ -108,11 +108,9 @@ oldest: ## after `bare`, in its environment: the oldest versions that the packag
 	cd build/bare && env/bin/gaident doctor && env/bin/gaident demo --quiet --out demo
 	env -u GAIDENT_DATA build/bare/env/bin/python -m pytest -q -p no:cacheprovider -m "not long" $(WHEEL_TESTS)
 
-embedded: ## the search in a drive, on two emulated Cortex-M boards, and the recurrences on ARM64, compared bit for bit (docs/dsp.md)
+embedded: ## the search in a drive, on two emulated Cortex-M boards, compared bit for bit (docs/dsp.md)
 	@csrc/embedded/tools.sh
 	@$(MAKE) --no-print-directory -f csrc/embedded/embedded.mk OUT=build/embedded
-	@if csrc/embedded/tools.sh arm64; then $(MAKE) --no-print-directory --jobs=$(JOBS) -f csrc/embedded/arm64.mk OUT=build/embedded; \
-		else echo "ARM64 left out: its tools do not install here" >&2; fi
 
 wasm: .venv/.installed ## the core as WebAssembly, compared bit for bit in node; the page that identifies in a browser (docs/try.md)
 	@csrc/embedded/tools.sh wasm
@@ -145,13 +143,26 @@ wheel: .venv/.tested .venv/.released ## this machine's wheel, installed and trie
 	$(WITHOUT_COMPILER) $(WHEEL)/bare/bin/python -m pytest -q -p no:cacheprovider $(WHEEL_TESTS)
 	@ls -l $(WHEEL)/repaired/*.whl
 
-# Only the programs: what ctest has beside them calls a shell. -O1: half the compile time of -O3, the same bits.
+# The C++ tests of another system, NAME, by tests/cpp/NAME.cmake. Only the programs: what ctest has beside them calls a shell.
+# -O1: half the compile time of -O3, the same bits.
+define cross_tested
+	@mkdir -p build/$(1)
+	$(CMAKE) -B build/$(1) --toolchain tests/cpp/$(1).cmake -DGAIDENT_BENCH=OFF -DGAIDENT_WERROR=OFF -DCMAKE_CXX_FLAGS_RELEASE=-O1 \
+		> build/$(1)/configure.log || { cat build/$(1)/configure.log; exit 1; }
+	$(BIN)/cmake --build build/$(1)
+	WINEDEBUG=-all WINEPREFIX="$(abspath build/$(1)/wine)" $(CTEST) build/$(1) -R '^test_'
+endef
+
 windows: .venv/.tools ## the C++ tests as Windows programs under Wine, for which Debian has g++-mingw-w64-x86-64-posix and wine
-	@mkdir -p build/windows
-	$(CMAKE) -B build/windows --toolchain tests/cpp/mingw.cmake -DGAIDENT_BENCH=OFF -DGAIDENT_WERROR=OFF -DCMAKE_CXX_FLAGS_RELEASE=-O1 \
-		> build/windows/configure.log || { cat build/windows/configure.log; exit 1; }
-	$(BIN)/cmake --build build/windows
-	WINEDEBUG=-all WINEPREFIX="$(abspath build/windows/wine)" $(CTEST) build/windows -R '^test_'
+	$(call cross_tested,windows)
+
+arm64: .venv/.built ## the C++ tests on an emulated ARM64, and the recurrences there compared bit for bit
+	@csrc/embedded/tools.sh arm64
+	$(call cross_tested,arm64)
+	qemu-aarch64-static build/arm64/tests/cpp/bits > build/arm64/bits.arm64
+	build/checked/tests/cpp/bits > build/arm64/bits.here
+	cmp build/arm64/bits.here build/arm64/bits.arm64
+	@echo "ARM64: $$(wc -l < build/arm64/bits.here) lines equal to this machine's, bit for bit"
 
 tidy: .venv/.tidied ## repair and format the Python and C++ sources
 	$(BIN)/ruff check --fix-only .

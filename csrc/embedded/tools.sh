@@ -1,5 +1,6 @@
 #!/bin/sh
-# What `make embedded` and `make wasm` need: looks for it, installs it where this is Debian and we are root or may become so, and otherwise says how.
+# What `make embedded`, `make arm64` and `make wasm` need: looks for it, installs it where this is Debian and we are root or may become so,
+# and otherwise says how.
 #
 #     tools.sh          for the drive's processors
 #     tools.sh arm64    for ARM64
