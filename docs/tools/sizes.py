@@ -1,4 +1,4 @@
-"""Prints how large an installation is, without extras and with each: `python docs/tools/sizes.py gaident-0.1.0-....whl`.
+"""Prints how large an installation is, without extras and with each: `python docs/tools/sizes.py gaident-0.2.0-....whl`.
 
 Each is installed into an empty folder by pip. MB are 10^6 bytes of the files, not of the blocks that a disk gives them.
 An extra's size is that of the distributions that an installation without extras has not.

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import datetime
 import re
 import shlex
 
@@ -44,10 +45,16 @@ def test_every_link_leads_somewhere(text: str) -> None:
             assert anchor in {heading.lower().replace(" ", "-") for heading in headings}, (target, anchor)
 
 
-def test_the_version_has_its_changes() -> None:
-    """CHANGELOG.md and CITATION.cff know the version that pyproject.toml states."""
-    assert re.search(rf"^## {re.escape(gaident.__version__)} ", CHANGES, re.MULTILINE)
-    assert f"\nversion: {gaident.__version__}\n" in (ROOT / "CITATION.cff").read_text(encoding="utf-8")
+def test_the_version_has_its_changes_and_a_date() -> None:
+    """The newest chapter of CHANGELOG.md that has a number, CITATION.cff and pyproject.toml state one version, and one date.
+
+    The two patterns are those that .github/workflows/release.yml looks for.
+    """
+    version, date = re.findall(r"^## (\d\S*) \((.*)\)$", CHANGES, re.MULTILINE)[0]
+    assert re.search(rf'^version = "{re.escape(version)}"$', (ROOT / "pyproject.toml").read_text(encoding="utf-8"), re.MULTILINE)
+    citation = (ROOT / "CITATION.cff").read_text(encoding="utf-8")
+    assert re.findall(r"^version: (.*)$", citation, re.MULTILINE) == [version]
+    assert re.findall(r"^date-released: (.*)$", citation, re.MULTILINE) == [datetime.date.fromisoformat(date).isoformat()]
 
 
 def test_every_call_in_the_changes_is_there() -> None:
