@@ -23,7 +23,7 @@ extern "C" {
 
 /* Of this interface: 10000 major + 100 minor + patch of gaident's version. An object of another major or, below 1.0, minor version may
  * have other structures: compare it with gaident_version() once, when the drive starts. */
-#define GAIDENT_H_VERSION 100
+#define GAIDENT_H_VERSION 200
 
 typedef struct gaident_search gaident_search;
 
