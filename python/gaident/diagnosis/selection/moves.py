@@ -114,14 +114,14 @@ class Moves(Repeated, WaveMoves):
     def _add(self, now: Fit) -> list[Fit]:
         self.note(f"looking beyond {words(now.effects) or 'the linear model'}")
         test = ScoreTest(self.objective)
-        addable = self.candidates(now)
-        test.add(now.hypothesis, now.x, [t for t in addable if not t.nested] + self.screened_at_load(now))
+        addable = [t for t in self.candidates(now) if not t.nested] + self.screened_at_load(now)
+        test.add(now.hypothesis, now.x, addable)
         fits: list[Fit] = []
         families = [t for t in now.parameters.terms if t.family]
         for simple in families:
             self._generalisations(test, now, now, simple)
         if all(t.at_load for t in families):
-            for first in [t for t in addable if t.family and not t.nested]:
+            for first in [t for t in addable if t.family]:
                 # The simplest of a family first: its generalisations are tried at its level.
                 start = next((s for s in test.ranked(WHITE) if s.term is first), None)
                 if start is not None:

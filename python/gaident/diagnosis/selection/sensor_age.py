@@ -13,6 +13,8 @@ A search without it fits it as a delay or, beside a current loop, as a resonance
   So both ages are fitted, with the linear mechanism alone and with the lag of a current loop.
   The velocity is no difference where the age of 0 scores better by more than the margin of two rivals, and so does the model that
   the search finds with it.
+  Nor is it one where the model found with half a sample scores better with the age of 0 by that margin, or without one of its
+  delays, lags or resonances in series at all: the linear mechanism shows the age less where an effect is hidden.
 - On another lattice (a gear, a scale, a unit between) the velocity may be a difference.
   Where the search finds a delay, a lag or a resonance in series with the mechanism, it is made again with the age of half
   a sample, which is no effect and costs nothing.
@@ -64,6 +66,11 @@ MEASURED_AHEAD = (
     "The motion comes {:.2g} ms before a measured {torque} that is held over each line of the log: between the lines it goes on, "
     "or it was filtered or written late on its way into the log. The simulation has it; what is late by less than half a line "
     "({:.2g} ms) is not seen in this log. {}"
+)
+
+NO_DIFFERENCE = (
+    "The velocities lie on the lattice of an encoder's {angle} ({} lines {}), but are no difference over one sample, which would "
+    "be {:.3g} ms old: with that age the model leaves more, or needs a delay, a lag or a resonance beside it."
 )
 
 Vector = NDArray[np.float64]
@@ -130,7 +137,11 @@ def searched(
             "and nothing speaks against it: they are taken for half a sample old ({:.3g} ms). The simulation has it; it is no "
             "finding."
         )
-        return search(older, most, None), [say(text, lines, each, age)]
+        found = search(older, most, None)
+        younger = _no_difference(found, objective, lambda start: search(objective, most, start))
+        if younger is not None:
+            return younger, [say(NO_DIFFERENCE, lines, each, age)]
+        return found, [say(text, lines, each, age)]
     found = search(objective, most, None)
     in_series = any(t.in_series for t in found.final.parameters.terms)
     step = encoder_step(shown, data.axis == "linear") if in_series else 0.0
@@ -181,8 +192,23 @@ def _better(again: Selection, found: Selection, margin: float) -> bool:
     return more <= 0 and _score_beside(again, found) < found.space.score(found.final) - margin
 
 
+def _no_difference(found: Selection, younger: Objective, search: Callable[[Fit], Selection]) -> Selection | None:
+    """What a search with the age of 0 ends with, where the model that was found speaks for that age; else None."""
+    closest, gain = _of_other_age(found, younger)
+    if gain < (POLICY.rival_margin if len(closest.effects) == len(found.final.effects) else 0.0):
+        return None
+    again = search(closest)
+    return again if _better(again, found, POLICY.rival_margin) else None
+
+
 def _over_older(found: Selection, older: Objective, margin: float) -> tuple[Fit, bool]:
-    """(the model that was found, fitted to the older velocities; whether it is better there by this margin [BIC units]).
+    """(the model that was found, fitted to the older velocities; whether it is better there by this margin [BIC units])."""
+    closest, gain = _of_other_age(found, older)
+    return closest, gain > margin
+
+
+def _of_other_age(found: Selection, other: Objective) -> tuple[Fit, float]:
+    """(the model that was found, fitted to velocities of another age; by how much it scores better there [BIC units]).
 
     As it is, without one of its lags and delays, or with another one in the place of that, whichever scores best.
     """
@@ -192,9 +218,9 @@ def _over_older(found: Selection, older: Objective, margin: float) -> tuple[Fit,
         if term.in_series:
             x = final.parameters.removed(final.x, term.name)
             tries.append(replace(final, hypothesis=final.hypothesis.without(term.name), x=x))
-    space = replace(space, objective=replace(space.objective, data=older.data))
-    closest = min((_fitted_to(older.data, f, space) for f in tries), key=space.score)
-    return closest, space.score(closest) < found.space.score(final) - margin
+    space = replace(space, objective=replace(space.objective, data=other.data))
+    closest = min((_fitted_to(other.data, f, space) for f in tries), key=space.score)
+    return closest, found.space.score(final) - space.score(closest)
 
 
 def _score_beside(again: Selection, found: Selection) -> float:

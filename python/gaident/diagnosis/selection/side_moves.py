@@ -103,7 +103,7 @@ class SideMoves(ModelSpace):
         """
         if now.parameters.masses == 1 or not self.swings(now):
             return []
-        wanted = [t for t in self.allowed if t.harmonic == "torque" or (t.simplest and t.levels)]
+        wanted = [t for t in self.allowed if t.other_side and not t.nested]
         found = [self._beside(now.hypothesis, t) for t in wanted]
         return [t for t in found if t is not None]
 

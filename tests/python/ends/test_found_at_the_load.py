@@ -1,0 +1,70 @@
+"""Effects at the load of two masses, found in logs of the motor alone; the drives are those of the independent rig."""
+
+from __future__ import annotations
+
+import zlib
+
+import numpy as np
+import pytest
+
+import gaident as ga
+from blind_judge import judge
+from drive_cases import Noise, random_case, two_masses
+from loop_cases import loop_kind, loop_plant
+
+LOAD = "@load"
+
+
+def drawn(effect: str, seed: int, noise: str) -> tuple[ga.Diagnosis, dict[str, dict[str, float]]]:
+    """(the diagnosis of a drawn drive that hides an effect at its load, the effect with its values)."""
+    plant = two_masses(np.random.default_rng([seed, zlib.crc32(effect.encode())]))
+    record, validation, controller, truth = random_case(seed, (effect + LOAD,), "multi", noise, True, plant=plant)
+    dia = ga.diagnose(record, controller=controller, validation=validation)
+    return dia, {name.removesuffix(LOAD): values for name, values in truth.effects.items()}
+
+
+@pytest.mark.long
+@pytest.mark.parametrize(
+    ("effect", "seed", "noise"),
+    [
+        # At the motor a drag leaves noise, but a filter of many numbers whitens it: at the load it is far better.
+        ("quadratic_drag", 3001000000, "white"),
+        ("square_root_drag", 3001000000, "white"),
+        ("square_root_drag", 3001000001, "encoder"),
+        # Friction with all its details at the load; dry friction alone is no better there than a drag.
+        ("lugre_friction", 3001000001, "white"),
+    ],
+)
+def test_what_acts_at_the_load_is_named_with_its_end(effect: str, seed: int, noise: str) -> None:
+    dia, hidden = drawn(effect, seed, noise)
+    assert dia.verdict == "explained" and judge(dia, hidden).exact
+    (cause,) = (f for f in dia.findings if not f.is_noise)
+    assert cause.sides == ("load",)
+    for name, value in hidden[effect].items():
+        found = cause.parameters[name]
+        assert abs(found.value - value) < 4.0 * found.std
+
+
+@pytest.mark.long
+def test_a_constant_torque_that_the_loop_compensates_is_named_although_the_free_run_does_not_show_it() -> None:
+    """The regression leaves less of the torque, but the model leaves less than noise and filter do: nothing speaks against it."""
+    dia, hidden = drawn("load_torque", 3001000001, "encoder")
+    assert dia.verdict == "explained" and judge(dia, hidden).exact
+    assert not dia.gain_interval[0] > 0.0, "the free run shows nothing of it"
+    (cause,) = (f for f in dia.findings if not f.is_noise)
+    assert cause.parameters["torque"].value == pytest.approx(hidden["load_torque"]["torque"], rel=1e-3)
+
+
+@pytest.mark.long
+@pytest.mark.parametrize(("every", "effect"), [(4, "cogging"), (2, "coulomb_friction")])
+def test_a_velocity_on_an_encoders_lattice_that_is_not_late_makes_no_resonance(every: int, effect: str) -> None:
+    """Taken for half a sample old, it needs a resonance above the log's band beside the effect, and shows no end of the shaft."""
+    number = 3003000
+    rng = np.random.default_rng([number, zlib.crc32(f"ip {every} {effect}".encode())])
+    plant = loop_plant("ip", every, rng, None, None)
+    noise = Noise(white=0.0, encoder=2.0 * np.pi / 2.0**19)
+    record, validation, controller, truth = random_case(number, (effect,), loop_kind("ip"), noise, True, plant=plant)
+    dia = ga.diagnose(record, controller=controller, validation=validation)
+    assert dia.verdict == "explained" and judge(dia, truth.effects).exact
+    assert any("are no difference over one sample" in note for note in map(str, dia.notes))
+    assert [f.sides for f in dia.findings if f.effect == effect] == [("motor",)]
