@@ -71,8 +71,8 @@ LIKELY = {
 class Check:
     """The second method's answer: what it found, its force error [N m], the comparison, before and after with their force errors.
 
-    regression_better: whether the regression leaves less torque, beyond the variation over blocks of the held-out data, where the
-    model leaves more than noise and filter make of it.
+    regression_better: whether the regression leaves less torque, beyond the variation over blocks of the held-out data, than the
+    model leaves beyond what noise and filter make of it.
     notes: contradictions, and on what the inertia rests, in words.
     reason: why the force error is the figure to go by on this axis, in words; empty where the free run is as good a figure.
     loses: whether the regression leaves far less, by more than `loses`, and that matters.
@@ -172,7 +172,9 @@ def _forces(
     before, after = fitness(gains.before, linear), fitness(gains.after, own)
     if after.force_floor is not None:
         after = replace(after, force_floor=math.hypot(after.force_floor, _of_the_filter(gains.extended, filtered)))
-        better = better and own is not None and own[0].rms > (after.force_floor or 0.0)
+        better = (
+            better and own is not None and second is not None and own[0].rms > math.hypot(after.force_floor or 0.0, second[0].rms)
+        )
     return before, after, None if second is None else second[0].rms, better
 
 

@@ -219,7 +219,7 @@ class Decisions:
         5.0, "1", "times the inertia's deviation with gravity left open: above, a note says on what the inertia rests", REAL
     )
     not_there: float = check(
-        2.0, "1", "standard deviations above its size as estimated: an effect that was not found is at most so large", REAL
+        2.0, "1", "standard deviations: an effect not found is at most so many above its estimate, one found more than 0", REAL
     )
     velocity_part: float = check(
         0.95,

@@ -199,7 +199,8 @@ def levels(up: tuple[float, float], down: tuple[float, float]) -> dict[str, ga.E
         (levels((0.038, 0.16), (0.0015, 0.16)), False),  # a load takes either level; the slopes are known, the friction is not
         (levels((0.04, 0.001), (0.0, 0.001)), True),  # one level is 0, and known to be
         ({"torque": estimate(0.05, 0.06)}, False),
-        ({"torque": estimate(0.05, 0.04)}, True),
+        ({"torque": estimate(0.05, 0.03)}, False),  # 0 is within two deviations
+        ({"torque": estimate(0.05, 0.02)}, True),
         ({"torque": estimate(0.05, float("nan"), at_bound=True)}, False),
         ({"amplitude": estimate(0.02, 0.001), "order": estimate(6.0, 0.0, "1/turn"), "phase": estimate(0.0, 0.02, "rad")}, True),
         ({"amplitude": estimate(0.02, 0.17), "order": estimate(6.0, 0.0, "1/turn"), "phase": estimate(1.5, 0.1, "rad")}, False),

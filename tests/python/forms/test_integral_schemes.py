@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import gc
 import weakref
+import zlib
 from dataclasses import replace
 from functools import cache
 
@@ -11,12 +12,13 @@ import numpy as np
 import pytest
 
 import gaident as ga
+from drive_cases import random_case
 from drive_rig import Plant
 from gaident.diagnosis.controller.form_findings import loop_of
 from gaident.diagnosis.controller.other_form import other_scheme
 from gaident.diagnosis.diagnose import _Prepared
 from gaident.identification.replay.integral_schemes import scheme_shown
-from loop_cases import BAND, DECAY, PERIOD, scheme_log
+from loop_cases import BAND, DECAY, PERIOD, loop_kind, loop_noise, loop_plant, scheme_log
 
 GIVEN = ga.Cascade(ga.PI(0.03, 2.0), PERIOD)
 
@@ -177,3 +179,15 @@ def test_a_diagnosis_names_the_law_and_no_mechanics() -> None:
     assert dia.mechanics["inertia"].value == pytest.approx(2.5e-4, rel=5e-3) and not dia.loop_follows
     assert any("the torque that it makes between the lines drives the models" in note for note in dia.notes)
     assert "error dead band" in dia.summary()
+
+
+@pytest.mark.long
+@pytest.mark.parametrize(("every", "noise"), [(8, "white"), (4, "encoder")])
+def test_what_noise_makes_of_a_held_integral_between_the_lines_is_no_decay_and_no_load(every: int, noise: str) -> None:
+    """One sample more before the limit is a step of the integral, which comes back wherever the torque leaves its limit."""
+    number = 3031000000
+    rng = np.random.default_rng([number, zlib.crc32(f"hold {every}".encode())])
+    plant = loop_plant("hold", every, rng, None, None)
+    record, validation, controller, _ = random_case(number, (), loop_kind("hold"), loop_noise(noise, number), True, plant=plant)
+    dia = ga.diagnose(record, controller=controller, validation=validation)
+    assert dia.verdict == "adequate" and not dia.causes, dia.summary()

@@ -2,8 +2,9 @@
 
 With x_i +- s_i its parameters that are torques, those at a bound left out,
 
-    s_i < max |x_k|  for all i,   and   s_j < |x_j|  for one of all its parameters.
+    n s_i < max |x_k|  for all i,   and   n s_j < |x_j|  for one of all its parameters,
 
+n = `not_there`: an effect that was not found is at most its estimate and n deviations, and one that was found is more than n.
 Of two levels one may be 0: what counts is the size of the larger one.
 Levels of 0.04 +- 0.16 and 0.00 +- 0.16 N m are none, whatever is known of the slopes beside them.
 """
@@ -14,6 +15,7 @@ from collections.abc import Mapping
 
 from gaident.axis import Text, say
 from gaident.diagnosis.library.sides import called_of
+from gaident.policy.table import POLICY
 from gaident.results.estimate import Estimate
 
 __all__ = ["determined", "not_determined"]
@@ -26,7 +28,8 @@ def determined(parameters: Mapping[str, Estimate]) -> bool:
     free = [e for e in parameters.values() if not e.at_bound]
     torques = [e for e in free if e.unit == TORQUE]
     size = max((abs(e.value) for e in torques), default=0.0)
-    return any(e.identifiable for e in free) and all(e.std < size for e in torques)
+    known = any(e.identifiable and POLICY.not_there * e.std < abs(e.value) for e in free)
+    return known and all(POLICY.not_there * e.std < size for e in torques)
 
 
 def not_determined(effect: str) -> Text:

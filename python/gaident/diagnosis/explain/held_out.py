@@ -8,7 +8,7 @@ A name rests on the records that were fitted. Data that no parameter has seen sp
 
 "Worse", "better" and "larger" are beyond the variation over blocks of the held-out data (95 % of a paired bootstrap): a lower
 error alone decides nothing.
-A force error that noise and filter make alone is not "larger".
+A force error is "larger" by what noise and filter do not make of it.
 "Worse" also means by more than an effect may add to the error (`harm`):
 of two models that leave little more than the noise, a significant difference may be too small to matter.
 The linear model is identified on the same samples as the extended one.

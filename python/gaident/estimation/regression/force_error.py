@@ -5,7 +5,8 @@
 
 F is the zero-phase filter of the inverse-dynamics regression: what makes m has passed it once, and so has s.
 Both pass it once more.
-s is the torque at the shaft: the logged torque behind the model's actuator, and behind its sensor's filter, which acts alike.
+s is the torque at the shaft: the logged torque behind the model's actuator, and behind its sensor's filter, which acts alike; but
+not behind that filter where a logged angle makes the motion, and the velocity is late behind it.
 
 m is found by simulation: a stiff PI loop leads the mechanism, with its effects at shaft and coupling, along the filtered motion.
 Its torque is m. Without effects that is inverse filtering, m = w/G.
@@ -32,6 +33,7 @@ from gaident.data.record import Record
 from gaident.data.torque_kind import MEAN, MEASURED
 from gaident.errors import ModelError, RecordError, SettingsError
 from gaident.estimation.regression.motion import ORDER, Motion, cutoff_of, low_passed, motion_of, noise_share, torque_noise
+from gaident.estimation.regression.sensor_lag import angle_is_ahead
 from gaident.models.held_torque import held_from_lines, held_torque
 from gaident.models.model import Model
 from gaident.models.simulate import run, simulate
@@ -237,7 +239,8 @@ def _at_shaft(model: Model, rec: Record) -> Vector:
     """The logged torque behind the actuator [N m], its mean over each sample: an inertia of 1 makes it a velocity's change."""
     assert rec.torque is not None
     logged = held_torque(rec) if rec.torque_log == MEAN else rec.torque
-    ahead = effects_before_the_shaft(model)
+    seen = [e.name for e in model.effects if e.row.place == "sensor"] if angle_is_ahead(rec) else []
+    ahead = set(effects_before_the_shaft(model)) - set(seen)
     if not ahead:
         return logged
     unit = Model(1.0, [0.0], effects=[e for e in model.effects if e.name in ahead])

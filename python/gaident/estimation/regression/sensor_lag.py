@@ -12,7 +12,7 @@ from gaident.data.record import Record
 from gaident.estimation.regression.motion import ORDER, cutoff_of, low_passed, motion_of
 from gaident.policy.table import POLICY
 
-__all__ = ["velocity_lag"]
+__all__ = ["angle_is_ahead", "velocity_lag"]
 
 
 def velocity_lag(rec: Record) -> float | None:
@@ -50,3 +50,9 @@ def velocity_lag(rec: Record) -> float | None:
     if float(rest @ rest) > POLICY.lag_left * float(seen @ seen):
         return None
     return lag / rec.dt
+
+
+def angle_is_ahead(rec: Record) -> bool:
+    """Whether the logged velocity is late behind the logged angle: a sensor's filter is then on the velocity alone."""
+    lag = velocity_lag(rec)
+    return lag is not None and lag > POLICY.lag_said

@@ -318,8 +318,9 @@ def _number(logs: Sequence[Log], scheme: Scheme, controller: Cascade, at_rate: b
 
     What the velocity did between the lines adds up in d (Cochrane and Orcutt 1949).
     scheme: with the number that leaves least without rho.
-    The deviation contains what a velocity that goes straight between the lines, another rule of integration, and no correlation
-    would change. A log at the controller's rate shows the rule, too.
+    The deviation contains what a velocity that goes straight between the lines, another rule of integration, no correlation, and
+    only the lines within the torque's limit would change: one step of the integral, of a sample more or less before the limit,
+    comes back at each way out of it. A log at the controller's rate shows the rule, too.
     """
     if scheme.kind == RESET:
         return scheme, 0.0
@@ -328,12 +329,16 @@ def _number(logs: Sequence[Log], scheme: Scheme, controller: Cascade, at_rate: b
     def of(number: float) -> Scheme:
         return replace(scheme, number=number)
 
-    def nearest(beside: Cascade) -> Scheme:
+    def nearest(beside: Cascade, shown: Sequence[NDArray[np.bool_]] | None = None) -> Scheme:
         def error(number: float) -> float:
-            return _rms([d[1:] - rho * d[:-1] for d in _left(logs, of(number), beside)])
+            off = _left(logs, of(number), beside)
+            parts = off if shown is None else [d[there] for d, there in zip(off, shown, strict=True)]
+            return _rms([d[1:] - rho * d[:-1] for d in parts])
 
         grid = scheme.number + _step(scheme) * np.linspace(-20.0, 20.0, 41)  # no decision: a grid
-        return _least(error, np.clip(grid, 0.0, 1.0) if scheme.kind == DECAY else grid, of)[1]
+        if scheme.kind == DECAY:
+            grid = np.clip(grid, 0.0, 1.0) if shown is None else np.union1d(np.clip(grid, 0.0, 1.0), 1.0 - LOST)
+        return _least(error, grid, of)[1]
 
     for _ in range(ROUNDS):
         left = _left(logs, scheme, controller)
@@ -343,6 +348,8 @@ def _number(logs: Sequence[Log], scheme: Scheme, controller: Cascade, at_rate: b
         scheme = nearest(controller)
     others = [] if at_rate else [replace(controller, velocity=replace(controller.velocity, rule=rule)) for rule in RULES]
     by_rule = max((abs(nearest(other).number - scheme.number) for other in others), default=0.0)
+    limit = POLICY.at_limit * controller.velocity.limits[0]
+    within = 0.0 if at_rate else nearest(controller, [np.abs(log.torque) < limit for log in logs]).number - scheme.number
 
     def made(by: float = 0.0, straight: bool = False) -> Vector:
         torques = (_made(of(scheme.number + by), controller, log, straight)[:: _every(log)] for log in logs)
@@ -355,7 +362,8 @@ def _number(logs: Sequence[Log], scheme: Scheme, controller: Cascade, at_rate: b
         return scheme, float("inf")
     straight = float(slope @ (made(straight=True) - here)) / power
     left_of = _rms([d[1:] - rho * d[:-1] for d in _left(logs, scheme, controller)])
-    return scheme, float(np.sqrt(left_of**2 / power + straight**2 + by_rule**2 + (scheme.number - uncorrelated) ** 2))
+    other = straight**2 + by_rule**2 + within**2 + (scheme.number - uncorrelated) ** 2
+    return scheme, float(np.sqrt(left_of**2 / power + other))
 
 
 def _step(scheme: Scheme) -> float:
