@@ -230,7 +230,7 @@ def diagnose(
             work = with_rule(work, most)
             for simpler in asked.simpler:
                 prepared.append(_Prepared.of(simpler, given, apart))
-                beside = driven_under(prepared[-1])
+                beside = replace(driven_under(prepared[-1]), every_line=driving.every_line)
                 here, there = (identified(one) for one in (driving, beside))
                 if POLICY.each_number * there.rmse < here.rmse:
                     note(0.03, "once more, under a simpler controller")
@@ -263,6 +263,11 @@ def diagnose(
                 if looped.found.driver is None:
                     work, found, discarded = looped
                     discarded.append(LOOP_MAKES)
+            if found.driver is not None and any(map(len, work.hit)):
+                note(0.03, "once more, with the lines that looked like outliers")
+                whole = under_best_controller(replace(driving, every_line=True), most, linear)
+                if whole.found.driver is None:
+                    work, found, discarded = whole
             if found.causes or found.driver is None:
                 break
             linear = linear if work.driving.regained_from is not None else work.idn  # a name needs more than one effect here

@@ -52,7 +52,7 @@ from gaident.diagnosis.linear_part import linear_of_part
 from gaident.diagnosis.mechanics import base_shift, mechanics_of, moved, of_no_axis, of_the_age
 from gaident.diagnosis.note import Note
 from gaident.diagnosis.records.folded import ADVICE, folded
-from gaident.diagnosis.records.hygiene import cleaned, left_out, left_unexplained, quantisation
+from gaident.diagnosis.records.hygiene import cleaned, left_unexplained, quantisation
 from gaident.diagnosis.records.sizes import scales_of
 from gaident.diagnosis.selection import attribution
 from gaident.diagnosis.selection.offset import Offset, offset_of
@@ -99,7 +99,7 @@ class Work:
         if (self.controller is None or self.pi is not None) and not self.driving.ticks:
             self.notes += open_loop_notes(self.records, self.pi)
         of_log = [self.driving.outliers_in(r) for r in self.records]  # the records have what the controller read there
-        others = [np.setdiff1d(left_out(r, self.idn.model, self.pi), h) for r, h in zip(self.records, of_log, strict=True)]
+        others = [self.driving.missed_in(r, self.idn.model) for r in self.records]
         self.hit = hit = [np.union1d(h, more) for h, more in zip(of_log, others, strict=True)]
         self.clean = clean = tuple(cleaned(r, h) for r, h in zip(self.records, others, strict=True))
         self.step = quantisation(self.records)

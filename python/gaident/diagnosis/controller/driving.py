@@ -25,12 +25,14 @@ from gaident.diagnosis.controller.measured_lag import Lag, behind_a_lag, command
 from gaident.diagnosis.controller.other_form import other_form, other_scheme
 from gaident.diagnosis.controller.wrong_number import OtherRule, closer_form, other_rules, with_findings, wrong_numbers
 from gaident.diagnosis.library.terms import LIBRARY
+from gaident.diagnosis.records.hygiene import left_out
 from gaident.diagnosis.unlogged.other_gains import OTHER_GAINS, OtherGains
 from gaident.diagnosis.unlogged.unlogged_form import UnloggedForm
 from gaident.identification.logged_torque import comparable, corrected, not_followed
 from gaident.identification.replay.driven_records import Driven
 from gaident.identification.replay.replay import replay
 from gaident.models.drive_torque import driven_by, on_lines, straight_driven
+from gaident.models.model import Model
 from gaident.results.estimate import Estimate
 from gaident.results.finding import Finding
 
@@ -54,6 +56,7 @@ class Driving:
     regained_from: the PI that was given, where records without a torque show other gains. lag: behind which a measured torque was
     logged; the records then contain the one before it. found: the controller's numbers that the records show.
     outliers: digest of a record as given -> lines whose velocity stands in the log alone, interpolated here.
+    every_line: whether each line counts that the controller read, also where a linear model misses it as it would an outlier.
     clocked: whether the sample time of the controller was given. left_open: whether some of its numbers were not.
     simulated: whether a simulated loop can have the controller.
     ticks: samples to a line of a controller that is given and not used, as the measured torque drives the model; else 0.
@@ -72,6 +75,7 @@ class Driving:
     lag: Lag | None = None
     found: FoundNumbers | None = None
     outliers: Mapping[str, NDArray[np.intp]] = field(default_factory=dict)
+    every_line: bool = False
     clocked: bool = False
     left_open: bool = False
     simulated: bool = True
@@ -156,6 +160,11 @@ class Driving:
         """Lines of one of the records that drive a model, whose velocity stood in the log alone."""
         lines = self.outliers.get(self.moved.given[rec.digest].digest, np.zeros(0, dtype=np.intp))
         return lines[lines < len(rec)]
+
+    def missed_in(self, rec: Record, model: Model) -> NDArray[np.intp]:
+        """Lines of a record that the controller read and a linear model misses as it would outliers: they are left out."""
+        of_log = self.outliers_in(rec)
+        return of_log[:0] if self.every_line else np.setdiff1d(left_out(rec, model, bare_pi(self.controller)), of_log)
 
     @property
     def read(self) -> tuple[Record, ...]:

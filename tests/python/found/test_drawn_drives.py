@@ -1,4 +1,4 @@
-"""Effects at the load of two masses, found in logs of the motor alone; the drives are those of the independent rig."""
+"""What is found in drives that the independent rig draws: effects at the load, ages of velocities, shafts that ring."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import pytest
 import gaident as ga
 from blind_judge import judge
 from drive_cases import Noise, random_case, two_masses
-from loop_cases import loop_kind, loop_plant
+from loop_cases import industrial_case, loop_kind, loop_plant
 
 LOAD = "@load"
 
@@ -68,3 +68,16 @@ def test_a_velocity_on_an_encoders_lattice_that_is_not_late_makes_no_resonance(e
     assert dia.verdict == "explained" and judge(dia, truth.effects).exact
     assert any("are no difference over one sample" in note for note in map(str, dia.notes))
     assert [f.sides for f in dia.findings if f.effect == effect] == [("motor",)]
+
+
+@pytest.mark.long
+def test_peaks_of_a_shaft_that_rings_faster_than_the_log_resolves_are_no_outliers() -> None:
+    """The linear model under the given controller misses them; with the rule of the drive a model follows each line."""
+    record, validation, controller, truth = industrial_case("backward", 4, "", 3032000)
+    plant = truth.plant
+    given = ga.Cascade(ga.PI(plant.kp, plant.ki), period=plant.dt / 4)
+    assert isinstance(controller, ga.Cascade) and controller.velocity.rule == "backward"
+    dia = ga.diagnose(record, controller=given, validation=validation)
+    assert dia.verdict == "explained" and "outliers" not in {f.effect for f in dia.findings}, dia.summary()
+    assert "integration_rule" in {f.effect for f in dia.findings}
+    assert dia.mechanics["inertia"].value == pytest.approx(plant.J + plant.JL, rel=1e-4)
