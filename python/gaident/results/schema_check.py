@@ -10,6 +10,7 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 from gaident.errors import GaidentError
+from gaident.version import version
 
 __all__ = ["check_saved"]
 
@@ -32,7 +33,19 @@ def check_saved(data: Any, schema: Schema) -> None:
     fault = _Check(schema).fault(data, schema, ())
     if fault is not None:
         place, what = fault
-        raise GaidentError(f"{'.'.join(map(str, place)) or 'the file'} {what}: the file is damaged; save it again")
+        remedy = "the file is damaged; save it again"
+        if _is_newer(made_by := data.get("gaident_version") if isinstance(data, dict) else None):
+            remedy = f"the file is of gaident {made_by}, newer than this {version()}; load it with that"
+        raise GaidentError(f"{'.'.join(map(str, place)) or 'the file'} {what}: {remedy}")
+
+
+def _is_newer(made_by: object) -> bool:
+    """Whether this is the number of a later version."""
+
+    def numbers(text: str) -> list[int]:
+        return [int(part) for part in re.findall(r"\d+", text)]
+
+    return isinstance(made_by, str) and numbers(made_by)[:3] > numbers(version())[:3]
 
 
 Place = tuple[str | int, ...]

@@ -64,3 +64,12 @@ def test_a_diagnosis_has_its_cause_and_its_controller() -> None:
     assert (dia.controller.velocity.kp, dia.controller.torque_filters) == (0.0232, (ga.LowPass(time_constant=0.4e-3),))
     assert np.abs(ga.simulate(dia.model, STILL)).max() > 1.0
     assert "coulomb friction" in dia.summary() and "gaident 0.1.0" in dia.summary()
+
+
+def test_a_file_of_a_newer_version_says_so(tmp_path: Path) -> None:
+    data = json.loads((SAVED / "diagnosis.json").read_text())
+    for made_by, words in (("999.0.0", "is of gaident 999.0.0, newer than this"), ("0.1.0", "damaged")):
+        path = tmp_path / "later.json"
+        path.write_text(json.dumps({**data, "gaident_version": made_by, "of_a_later_version": 1}))
+        with pytest.raises(ga.GaidentError, match=words):
+            ga.load(path)
