@@ -23,6 +23,7 @@
     proposals   experiments that are proposed, run on the axis that they are for (rows/proposals.py)
     unlogged    logs without a torque, of a controller with a filter that the given one has not (rows/unlogged.py)
     responses   frequency responses that a record shows by itself (rows/responses.py)
+    instruments frequency responses of a record as data of an identification, under commands of many kinds (rows/instruments.py)
     headers     names of columns, commas and letters of text logs (rows/headers.py)
     numbers     controllers with numbers that nobody gave (rows/numbers.py)
     courses     parameters of an axis over months: steps, drifts, temperature, nothing (rows.made.courses.py)
@@ -53,6 +54,7 @@ from rows.case import Case, Result, digest
 from rows.encoders import encoders, lines_shown
 from rows.forms import forms, shown
 from rows.headers import header_read, headers
+from rows.instruments import instruments, shown_response
 from rows.lags import lag_found, lags
 from rows.logs import logs, read_log
 from rows.made.courses import change_found, courses
@@ -287,6 +289,7 @@ KINDS: dict[str, tuple[Callable[[int, int], list[Case]], Callable[[Case], Result
     "proposals": (proposals, kept),
     "unlogged": (unlogged, form_found),
     "responses": (responses, shown_points),
+    "instruments": (instruments, shown_response),
     "headers": (headers, header_read),
     "pitches": (pitches, pitch_seen),
     "courses": (courses, change_found),

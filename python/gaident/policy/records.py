@@ -4,7 +4,20 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from gaident.policy.declared import DRIVES, ENCODER, LOOP, REAL, REGRESSION, SAMPLED, SHORT, SLOWER, SUCCESS, WINDING, record
+from gaident.policy.declared import (
+    DRIVES,
+    ENCODER,
+    INSTRUMENTS,
+    LOOP,
+    REAL,
+    REGRESSION,
+    SAMPLED,
+    SHORT,
+    SLOWER,
+    SUCCESS,
+    WINDING,
+    record,
+)
 
 __all__ = ["Records"]
 
@@ -83,4 +96,27 @@ class Records:
         "1",
         "damping ratio by which an antiresonance may be damped more than resonance and motor, as that of no shaft is",
         DRIVES,
+    )
+
+    # The instrument of a frequency response: the command, or in open loop the torque.
+    repeats_within: float = record(1e-4, "1", "of a command's rms: what differs between periods of it at most", INSTRUMENTS)
+    instrument_line: float = record(
+        1e-3, "1", "of the largest line of a command: a smaller one is none of a multisine", INSTRUMENTS
+    )
+    instrument_empty: float = record(1e-6, "1", "the same, below which a line is rounding and excites nothing", INSTRUMENTS)
+    instrument_apart: float = record(
+        0.1, "1", "of its power in a window, that is left beside what the start and the end of a record make", INSTRUMENTS
+    )
+    instrument_covered: float = record(
+        2.0, "1", "times what polynomials miss in a window shows in its errors: so much it may change the estimate", INSTRUMENTS
+    )
+    instrument_strong: float = record(
+        30.0,
+        "1",
+        "times its variance, that neighbouring windows have the torque's answer squared; weaker shows noise",
+        INSTRUMENTS,
+    )
+    instrument_alone: float = record(10.0, "1", "the same of a window alone (Staiger and Stock 1997)", INSTRUMENTS)
+    noise_alone: float = record(
+        2.5, "1", "times the noise of neighbouring windows: above, the noise of a window is its own", INSTRUMENTS
     )

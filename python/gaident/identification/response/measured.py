@@ -3,23 +3,20 @@
 Two ways, with U, W, R the spectra of torque, velocity and instrument r (the command of a loop; in open loop the torque itself).
 Noise that the loop brings back is not in r, so that it biases neither.
 
-Where r is periodic, with P periods after the first, and R the same in each:
+Where r repeats itself, with P periods after the first:
 
-    G(k) = sum_p W_p conj(R) / sum_p U_p conj(R),   var G = sum_p |W_p - G U_p|^2 / ((P - 1) P |mean U|^2)
+    G(k) = sum_p W_p / sum_p U_p,   var G = sum_p |W_p - G U_p|^2 / ((P - 1) P |mean U|^2)
 
-Else by local polynomials (R. Pintelon, J. Schoukens, "System Identification: A Frequency Domain Approach", 2nd ed., 2012, ch. 7):
-over the 2 m + 1 lines around line k, by least squares,
+at the lines that r has.
+Else, and of two periods, by local polynomials over the lines of the spectrum (`local.py`).
 
-    [U; W](k + i) = (A_0 + A_1 i + A_2 i^2) R(k + i) + B_0 + B_1 i + B_2 i^2 + noise,   G(k) = A_0w / A_0u
-
-where B takes what the start and the end of the record make (leakage), and the noise's covariance is that of what is left.
-The windows do not overlap: values at different frequencies have independent errors.
+Where r excites nothing, or less than noise does, torque and velocity are what the loop makes of noise, G would be -1/C, and that
+without any scatter: no value stands there, and the notes say so.
 """
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,7 +27,21 @@ from gaident.control.controller import Controller, checked_controller
 from gaident.data.frequency.response import FrequencyResponse
 from gaident.data.record import Record
 from gaident.errors import RecordError
+from gaident.identification.response.instrument import (
+    EMPTY,
+    WEAK,
+    Lines,
+    Unshown,
+    band_notes,
+    chosen_lines,
+    near_mean,
+    strong,
+    too_few,
+)
+from gaident.identification.response.local import local_lines
+from gaident.identification.response.repeated import period_of
 from gaident.models.held_torque import held_mean
+from gaident.policy.table import POLICY
 
 __all__ = ["frequency_response"]
 
@@ -38,24 +49,8 @@ Vector = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
 PERIODS = 3  # no decision: of statistics: the first settles, two say what the noise is
-EXCITED = 1e-3  # no decision: a grid: of the largest line of a period; smaller ones excite nothing
-NARROW = 6  # no decision: a grid: lines to either side of a window, two for each coefficient
-WIDE = 0.01  # no decision: a grid: the same as a share of the window's frequency, where that is more
-UNKNOWN = 6  # no decision: a formula: coefficients of a window
-NEAR = 4  # no decision: a grid: lines to either side that share a deviation, where each has a few periods only
-MOST_LINES = 600  # no decision: memory and time: frequencies of a response
+SHORTEST = 220  # no decision: a formula: eight windows of 13 lines, of a spectrum that has half of a record's lines
 USABLE = 0.8  # no decision: a formula: of half the log's sampling frequency, where the controller is faster than the log
-
-
-@dataclass(frozen=True)
-class _Lines:
-    """Values at lines of a spectrum [Hz]; std: of the complex value."""
-
-    frequency: Vector
-    value: Complex
-    std: Vector
-    coherence: Vector
-    how: str
 
 
 def frequency_response(rec: Record, controller: Controller | None = None) -> FrequencyResponse:
@@ -63,11 +58,13 @@ def frequency_response(rec: Record, controller: Controller | None = None) -> Fre
 
     With a command that changes it is the instrument, so that noise which the loop brings back does not bias the response.
     A periodic one (a multisine) of three periods or more is averaged over its periods; else local polynomials are fitted.
+    There is a value at those frequencies only at which the instrument makes the torque move beyond noise, and is told from what
+    the start and the end of the record make; the notes name the bands that are left out, and why.
 
     Parameters
     ----------
     rec : Record
-        A record with torque and velocity; from 200 lines on, and the more the better it resolves.
+        A record with torque and velocity; from 220 lines on, and the more the better it resolves.
     controller : PI or Cascade, optional
         Of its loop; None: open loop, the torque is independent of the velocity's noise.
         Without a logged torque it makes the torque.
@@ -82,12 +79,13 @@ def frequency_response(rec: Record, controller: Controller | None = None) -> Fre
     Raises
     ------
     RecordError
-        Where there is no torque and none can be made, where what should excite the axis never changes, and for a record that is
-        too short.
+        Where there is no torque and none can be made, where what should excite the axis never changes, for a record that is too
+        short, and where fewer than 8 frequencies are left: it says what the command lacks.
 
     References
     ----------
     R. Pintelon, J. Schoukens, "System Identification: A Frequency Domain Approach", 2nd ed., 2012, chapters 2 and 7.
+    D. Staiger, J. H. Stock, "Instrumental variables regression with weak instruments", Econometrica 65, 1997.
 
     Examples
     --------
@@ -130,9 +128,9 @@ def frequency_response(rec: Record, controller: Controller | None = None) -> Fre
         raise RecordError("the velocity never changes, so that it shows no response; use a record in which the axis moves")
     if _constant(torque):
         raise RecordError(say("the {torque} never changes, so that it excites no frequency; use a record whose {torque} changes"))
-    period = _period(drive)
-    lines = _periodic(torque, rec.velocity, drive, period, rec.dt) if period else _local(torque, rec.velocity, drive, rec.dt)
-    notes = [lines.how]
+    name = "{torque}" if drive is torque else "command"
+    lines = _lines(torque, rec.velocity, drive, rec.dt)
+    highest = 0.5 / rec.dt  # no decision: a formula: half the sampling frequency
     value, std, keep = lines.value, lines.std, np.isfinite(lines.std) & (lines.std > 0.0) & (np.abs(lines.value) > 0.0)
     dt: float | None = rec.dt
     if every > 1:
@@ -140,16 +138,15 @@ def frequency_response(rec: Record, controller: Controller | None = None) -> Fre
         s = 2j * math.pi * lines.frequency * rec.dt / every
         hold = -np.expm1(-s) / s
         value, std, dt = value / hold, std / np.abs(hold), None
-        keep &= lines.frequency < USABLE * 0.5 / rec.dt  # no decision: a formula: half the sampling frequency
-    found = np.flatnonzero(keep)
-    if len(found) > MOST_LINES:
-        # Evenly spaced in the logarithm of the frequency.
-        places = np.geomspace(1.0, float(len(found)), MOST_LINES) - 1.0
-        found = found[np.unique(np.rint(places).astype(int))]
+        highest *= USABLE
+        keep &= lines.frequency < highest
+    found = chosen_lines(np.flatnonzero(keep))
     if len(found) < 8:  # no decision: what an argument may be: a response has so many frequencies at least
-        raise RecordError(
-            f"the record of {len(rec)} lines shows a response at {len(found)} frequencies only: use a longer record"
-        )
+        if len(rec) < SHORTEST:
+            few = f"the record of {len(rec)} lines shows a response at {len(found)} frequencies only"
+            raise RecordError(f"{few}: use a longer record, of {SHORTEST} lines or more")
+        raise too_few(len(found), lines.left_out, name)
+    notes = [lines.how, *band_notes(lines.frequency[found], lines.left_out, name, highest)]
     return FrequencyResponse(
         lines.frequency[found], value[found], std[found], lines.coherence[found], dt=dt, name=rec.name, notes=notes
     )
@@ -160,20 +157,17 @@ def _constant(x: Vector) -> bool:
     return float(np.ptp(x)) <= 1e-9 * float(np.abs(x).max())
 
 
-def _period(x: Vector) -> int:
-    """Lines of the shortest period that x repeats exactly at least three times; 0: none."""
-    n = len(x)
-    first = x[: max(1, n // PERIODS // 4)]  # no decision: a grid: what a candidate has to repeat at once
-    # A period begins where the value of the first line comes back.
-    for period in np.flatnonzero(x[1 : n // PERIODS + 1] == x[0]) + 1:
-        p = int(period)
-        size = min(len(first), n - p)
-        if np.array_equal(x[p : p + size], first[:size]) and np.array_equal(x[p:], x[:-p]) and np.ptp(x[:p]) > 0.0:
-            return p
-    return 0
+def _lines(u: Vector, w: Vector, r: Vector, dt: float) -> Lines:
+    """By the means of periods, or by local polynomials: where r repeats itself over its last whole periods."""
+    period = period_of(r)
+    count = len(r) // period if period else 0
+    if count >= PERIODS:
+        return _periodic(u, w, r, period, dt)
+    first = len(r) - count * period if count else 0
+    return local_lines(u[first:], w[first:], r[first:], count, dt)
 
 
-def _periodic(u: Vector, w: Vector, r: Vector, period: int, dt: float) -> _Lines:
+def _periodic(u: Vector, w: Vector, r: Vector, period: int, dt: float) -> Lines:
     """Means over the periods but the first, and how they scatter."""
     count = len(r) // period
     first = len(r) - (count - 1) * period  # the last whole periods
@@ -182,68 +176,22 @@ def _periodic(u: Vector, w: Vector, r: Vector, period: int, dt: float) -> _Lines
         found: Complex = np.fft.rfft(x[first:].reshape(count - 1, period), axis=1)
         return found
 
-    U, W, R = spectra(u), spectra(w), np.fft.rfft(r[first : first + period])
+    U, W, R = spectra(u), spectra(w), spectra(r).mean(axis=0)
     line = np.arange(1, (period - 1) // 2 + 1)
-    line = line[np.abs(R[line]) > EXCITED * np.abs(R[line]).max()]
-    U, W = U[:, line], W[:, line]
+    per = 1.0 / (period * dt)
+    excited = np.abs(R[line]) > POLICY.instrument_line * np.abs(R[line]).max(initial=0.0)
+    left_out = [Unshown((k - 0.5) * per, (k + 0.5) * per, EMPTY) for k in line[~excited]]
+    line = line[excited]
+    U, W, R = U[:, line], W[:, line], R[line]
     mean_u, mean_w = U.mean(axis=0), W.mean(axis=0)
     value = mean_w / mean_u
-    left = np.sum(np.abs(W - value * U) ** 2, axis=0) / (count - 2)
-    near = (len(line) - 1) // 2
-    window = np.ones(2 * (NEAR if near > NEAR else near) + 1)
-    shared = np.convolve(left, window, "same") / np.convolve(np.ones(len(line)), window, "same")
-    std = np.sqrt(shared / (count - 1)) / np.abs(mean_u)
-    coherence = 1.0 / (1.0 + shared / (count - 1) / np.maximum(np.abs(mean_w) ** 2, 1e-300))
-    how = f"Mean of {count - 1} periods of {period} lines, the first left out."
-    return _Lines(line / (period * dt), value, std, coherence, how)
-
-
-def _local(u: Vector, w: Vector, r: Vector, dt: float) -> _Lines:
-    """Local polynomials over windows of the spectrum."""
-    n = len(r)
-    U, W, R = (np.fft.rfft(x - x.mean())[1 : (n - 1) // 2 + 1] for x in (u, w, r))  # lines 1, 2, ...
-    rows: list[tuple[float, complex, float, float]] = []
-    start = 0
-    while True:
-        half = _half(start)
-        size = 2 * half + 1
-        if start + size > len(R):
-            break
-        part = slice(start, start + size)
-        i = np.arange(-half, half + 1) / half
-        own = R[part] / np.sqrt(np.mean(np.abs(R[part]) ** 2) + 1e-300)
-        basis = np.stack([own, own * i, own * i**2, np.ones(size), i, i**2], axis=1)
-        rows.append((start + half + 1.0, *_window(basis, np.stack([U[part], W[part]], axis=1), r is u)))
-        start += size
-    line, value, std, coherence = np.array(rows, complex).reshape(-1, 4).T
-    how = f"Local polynomials over {2 * NARROW + 1} lines of the spectrum and more, {1.0 / (n * dt):.2g} Hz apart."
-    return _Lines(line.real / (n * dt), value, std.real, coherence.real, how)
-
-
-def _half(line: int) -> int:
-    """Lines to either side of a window that begins at a line."""
-    return NARROW if WIDE * line < NARROW else int(WIDE * line)
-
-
-def _window(basis: Complex, signals: Complex, open_loop: bool) -> tuple[complex, float, float]:
-    """(G, its standard deviation, coherence) at the middle of a window; signals: torque and velocity (lines, 2)."""
-    q, triangle = np.linalg.qr(basis)
-    size = np.abs(np.diag(triangle))
-    # no decision: rounding: instrument and start are one there
-    if not float(size.min()) > 1e-6 * float(size.max()):
-        return 1.0 + 0.0j, math.inf, 0.0
-    found = np.linalg.solve(triangle, q.conj().T @ signals)
-    left = signals - basis @ found
-    noise = (left.conj().T @ left) / (len(basis) - UNKNOWN)  # covariance of torque and velocity
-    of_torque, of_velocity = found[0]
-    if not abs(of_torque) > 0.0:
-        return 1.0 + 0.0j, math.inf, 0.0
-    value = complex(of_velocity / of_torque)
-    weights = np.array([-value, 1.0])
-    scatter = float((weights @ noise.T @ weights.conj()).real) if not open_loop else float(noise[1, 1].real)
-    inverse = np.linalg.solve(triangle, np.eye(len(triangle)))
-    variance = max(scatter, 0.0) * float(np.sum(np.abs(inverse[0]) ** 2)) / abs(of_torque) ** 2
-    power = abs(value) ** 2
+    even = np.ones(len(line))
+    left = near_mean(np.sum(np.abs(W - value * U) ** 2, axis=0) / (count - 2), even)
+    of_torque = near_mean(np.sum(np.abs(U - mean_u) ** 2, axis=0) / (count - 2), even)
     # Exact signals leave rounding, which still is an error.
-    variance = max(variance, (1e-12 * abs(value)) ** 2)
-    return value, math.sqrt(variance), power / (power + variance)
+    std = np.maximum(np.sqrt(left / (count - 1)) / np.abs(mean_u), 1e-12 * np.abs(value))
+    coherence = 1.0 / (1.0 + left / (count - 1) / np.maximum(np.abs(mean_w) ** 2, 1e-300))
+    keep = strong(mean_u / R, (count - 1) * np.abs(R) ** 2, of_torque, even)
+    left_out += [Unshown((k - 0.5) * per, (k + 0.5) * per, WEAK) for k in line[~keep]]
+    how = f"Mean of {count - 1} periods of {period} lines, the first left out."
+    return Lines(line[keep] * per, value[keep], std[keep], coherence[keep], how, left_out)
