@@ -25,7 +25,7 @@ from gaident.identification.arguments import check_arithmetic, check_numbers, ch
 from gaident.identification.closed_loop import input_of, looped_over, space_of
 from gaident.identification.controller_numbers import with_estimates
 from gaident.identification.noise import Autoregression, autoregression_of, highest_order
-from gaident.identification.notes import inertia_of, record_notes, slower_than_the_loop, unseen_notes
+from gaident.identification.notes import inertia_of, record_notes, seen_up_to, slower_than_the_loop, unseen_notes
 from gaident.identification.parts import search_parts
 from gaident.identification.replay.notes import replay_notes
 from gaident.identification.replay.timed_record import plain_of
@@ -312,6 +312,7 @@ class RecordSearch(StructureSearch):
             "initial_states": states,
             "records": tuple(map(plain_of, self.records)),
             **told_of([w.response for w in self.weighed]),
+            "unseen_above": max([seen_up_to(self.records[0].dt), *(float(w.response.frequency_hz[-1]) for w in self.weighed)]),
         }
 
 

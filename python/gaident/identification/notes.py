@@ -22,6 +22,7 @@ __all__ = [
     "open_loop_notes",
     "reading_notes",
     "record_notes",
+    "seen_up_to",
     "slower_than_the_loop",
     "unseen_notes",
     "warnings_of",
@@ -63,9 +64,14 @@ def warnings_of(
     return tuple(notes)
 
 
+def seen_up_to(dt: float) -> float:
+    """Frequency [Hz] up to which the lines of a log, dt [s] apart, show a resonance."""
+    return POLICY.seen_band * 0.5 / dt  # no decision: a formula: half the sampling frequency
+
+
 def unseen_notes(mechanics: OneMass | TwoMass | None, dt: float) -> list[str]:
     """A sentence on a resonance above what the lines of the log show, dt [s] apart."""
-    highest = POLICY.seen_band * 0.5 / dt  # no decision: a formula: half the sampling frequency
+    highest = seen_up_to(dt)
     if not isinstance(mechanics, TwoMass) or not mechanics.resonance / math.tau > highest:
         return []
     return [

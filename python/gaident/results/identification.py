@@ -94,8 +94,9 @@ class Identification(SavedResult):
     frequencies : int
         Frequencies of all responses. Of responses alone `samples` is 0 and `rmse` that of the relative error [1].
     delay, lag : Estimate or None
-        Of the torque's path [s], which the frequency responses contain beside the axis, with their deviations; None: none was
-        needed. They are the effects `transport_delay` and `torque_lag` of `model`.
+        Of the torque's path [s], which frequency responses contain; None: none was needed. They are effects of `model`, too.
+    unseen_above : float or None
+        Frequency [Hz] above which a resonance would not have shown: where log or responses end; None: an older result.
     response_digests : tuple of str
         Digests of the frequency responses, see `FrequencyResponse.digest`.
     responses : tuple of FrequencyResponse
@@ -134,6 +135,7 @@ class Identification(SavedResult):
     frequencies: int = 0
     delay: Estimate | None = None
     lag: Estimate | None = None
+    unseen_above: float | None = None
     response_digests: tuple[str, ...] = ()
     responses: tuple[FrequencyResponse, ...] = field(default=(), compare=False, repr=False)
 
@@ -349,6 +351,7 @@ class Identification(SavedResult):
             "samples": self.samples,
             "digests": list(self.digests),
             "frequencies": self.frequencies,
+            "unseen_above": self.unseen_above,
             **{name: None if e is None else asdict(e) for name, e in (("delay", self.delay), ("lag", self.lag))},
             "response_digests": list(self.response_digests),
             "initial_states": {d: list(s) for d, s in self.initial_states.items()},
@@ -390,6 +393,7 @@ class Identification(SavedResult):
                 controller_numbers={name: Estimate(**e) for name, e in data.get("controller_numbers", {}).items()},
                 covariance=rows_of(data.get("covariance")),
                 frequencies=data.get("frequencies", 0),
+                unseen_above=data.get("unseen_above"),
                 delay=Estimate(**data["delay"]) if data.get("delay") else None,
                 lag=Estimate(**data["lag"]) if data.get("lag") else None,
                 response_digests=tuple(data.get("response_digests", ())),

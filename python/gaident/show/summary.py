@@ -22,6 +22,7 @@ __all__ = [
     "meaning_of",
     "mechanics_comparison",
     "stem_of",
+    "unseen_words",
 ]
 
 SHOWN_STRUCTURES = 5  # no decision: how many are listed
@@ -116,7 +117,20 @@ def _model(idn: Identification, axis: str) -> list[str]:
     head = f"Model: gain K = {_estimate(gain)} {unit(gain.unit, axis)} {flags_of([gain])}".rstrip()
     late = ", ".join(f"{name} {_estimate(e)} {e.unit} {flags_of([e])}".rstrip() for name, e in idn.path.items())
     beside = [f"  Path of the {word('torque', axis)}: {late}"] if late else []
-    return [head, *(table(rows) if len(rows) > 1 else []), *beside]
+    unseen = [f"  {line}" for line in textwrap.wrap(unseen_words(idn), WIDTH - 2)]
+    return [head, *(table(rows) if len(rows) > 1 else []), *beside, *unseen]
+
+
+def unseen_words(idn: Identification) -> str:
+    """That a resonance above what log or responses reach would not have shown; nothing where that is not known."""
+    if idn.unseen_above is None:
+        return ""
+    why = "the log has too few lines"
+    if idn.response_digests:
+        why = "the responses end there" if idn.of_responses else "log and responses end there"
+    above = idn.of_responses and any(r.imag > 0.0 and abs(r) > math.tau * idn.unseen_above for r in idn.model.poles)
+    but = ", but by what it does below" if above else ""
+    return f"A resonance above {number(idn.unseen_above)} Hz would not have shown{but}: {why}."
 
 
 def stem_of(name: str) -> str:

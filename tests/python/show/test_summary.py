@@ -37,6 +37,7 @@ class Fake:
     version: str = "0.1.0"
     digests: tuple[str, ...] = ("c0ffee",)
     frequencies: int = 0
+    unseen_above: float | None = 400.0
     path: dict[str, Estimate] = field(default_factory=dict)
     response_digests: tuple[str, ...] = ()
     of_responses: bool = False

@@ -11,10 +11,11 @@ from gaident.axis import Text, say
 from gaident.data.frequency.response import FrequencyResponse
 from gaident.identification.response.path import Path
 from gaident.identification.structure_search import PERCENT
+from gaident.models.model import Model
 from gaident.policy.table import POLICY
 from gaident.results.estimate import Estimate
 
-__all__ = ["GIVES_POWER", "NO_STD", "compared_notes", "path_note"]
+__all__ = ["GIVES_POWER", "NO_STD", "compared_notes", "path_note", "tail_notes"]
 
 MS = 1e3  # no decision: a unit: s to ms
 STANDS_OUT = 2.0  # no decision: which peak a sentence speaks of: one of twice the median
@@ -38,6 +39,18 @@ def path_note(path: dict[str, Estimate], rival: Path | None) -> Text:
         other = " and ".join(f"a {name} of {MS * getattr(rival, name):.4g} ms" for name in rival.unknowns)
         text += f" It does not tell this apart from {other}."
     return say(text)
+
+
+def tail_notes(model: Model, highest: float) -> list[str]:
+    """A sentence on resonances above the highest frequency [rad/s] of the responses."""
+    above = sorted({abs(r) / math.tau for r in model.poles if r.imag > 0.0 and abs(r) > highest})
+    if not above:
+        return []
+    listed = " and ".join(f"{f:.3g} Hz" for f in above)
+    return [
+        f"A resonance of {listed} lies above the highest frequency of the responses, {highest / math.tau:.3g} Hz: only what it "
+        "does below shows it. Measure up to it to be sure of its numbers."
+    ]
 
 
 def compared_notes(responses: Sequence[FrequencyResponse]) -> list[Text]:

@@ -19,7 +19,7 @@ from gaident.estimation.criterion import bic
 from gaident.identification import covariance, selection
 from gaident.identification.noise import Autoregression
 from gaident.identification.response.path import NO_PATH, Path, Together, fitted, is_start, lags_after, starts, with_lag
-from gaident.identification.response.response_notes import GIVES_POWER, NO_STD, compared_notes, path_note
+from gaident.identification.response.response_notes import GIVES_POWER, NO_STD, compared_notes, path_note, tail_notes
 from gaident.identification.response.weighed import assessed_responses, weighed
 from gaident.identification.selection import Candidate
 from gaident.identification.structure_search import FINAL_TOLERANCE, PERCENT, Assessed, ProgressCallback, StructureSearch
@@ -35,6 +35,7 @@ Matrix = NDArray[np.float64]
 
 DIGITS = 1e-7  # no decision: rounding: of a value that is written with seven digits
 MOST_LINES = 600  # no decision: memory and time: frequencies of a response, where a path is looked for
+ABOVE = 4.0  # no decision: a start: a range to search, times the highest frequency
 MOST = 0.5  # no decision: a formula: more than half
 GIVEN = 0.1  # no decision: rounding: of |G|, by which errors of a response make a real part negative
 
@@ -51,17 +52,20 @@ def distinct_responses(responses: Sequence[FrequencyResponse]) -> list[Frequency
 
 
 def response_space(responses: Sequence[FrequencyResponse]) -> SearchSpace:
-    """Search ranges of responses: K about |G| omega, which a rigid axis has all along, roots where the frequencies lie.
+    """Search ranges of responses: K about |G| omega, which a rigid axis has all along, roots where the frequencies lie and above.
 
-    From thirty times less to a thousand times more, as of records.
+    K from thirty times less to a thousand times more, as of records.
+    A resonance above the frequencies bends the response below it, by which it is found where the errors are small; behind a hold
+    none lies above half the sampling frequency.
     """
     found = np.concatenate([np.abs(r.velocity_response) * r.omega for r in responses])
     low, high = min(float(r.omega[0]) for r in responses), max(float(r.omega[-1]) for r in responses)
     middle = float(np.median(found))
+    held = max(math.inf if r.dt is None else math.pi / r.dt for r in responses)
     return SearchSpace(
         gain=(middle / 30.0, middle * 1000.0),
         real=(-0.1 * low, 10.0 * high),  # no decision: a start: a range to search
-        imaginary=(0.1 * low, high),  # no decision: a start: a range to search
+        imaginary=(0.1 * low, min(ABOVE * high, held)),
         p=(1, 3),
         q=(0, 4),  # no decision: a start: up to three masses
         source=f"derived from the responses: K about {middle:.4g}, {low / math.tau:.4g} to {high / math.tau:.4g} Hz",
@@ -72,6 +76,7 @@ def told_of(responses: Sequence[FrequencyResponse]) -> dict[str, Any]:
     """What an `Identification` says of its responses."""
     return {
         "frequencies": sum(len(r) for r in responses),
+        "unseen_above": max((float(r.frequency_hz[-1]) for r in responses), default=None),
         "response_digests": tuple(r.digest for r in responses),
         "responses": tuple(responses),
     }
@@ -373,4 +378,5 @@ class ResponseSearch(StructureSearch):
             found.append(path_note(self.found_path(best), self.rival))
         if selection.is_chain(best.candidate) and self.gives_power(best.candidate):
             found.append(GIVES_POWER)
+        found += tail_notes(best.candidate.model, self._highest)
         return list(dict.fromkeys(found)) + compared_notes(self.responses)

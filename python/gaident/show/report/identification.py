@@ -27,7 +27,7 @@ from gaident.show.report.parts import (
 from gaident.show.report.views import View
 from gaident.show.response_plots import response_chart
 from gaident.show.search_charts import convergence_chart, roots_chart, structures_chart
-from gaident.show.summary import flags_of, inconsistency_words, meaning_of, stem_of
+from gaident.show.summary import flags_of, inconsistency_words, meaning_of, stem_of, unseen_words
 from gaident.show.wording import number as plain_number
 from gaident.show.wording import structure_words
 
@@ -140,6 +140,7 @@ def _parameters(idn: Identification, view: View, drawn: Charts) -> Section:
     parts.append(table(columns, [[_root(idn.parameters, stem) for stem in stems]]))
     late = [[(name, estimate(e.value, e.std), e.unit, flags_of([e])) for name, e in idn.path.items()]]
     parts.append(table((f"Path of the {word('torque', axis)}", "value", "unit", ""), late) if idn.path else "")
+    parts.append(tag("p", typeset(unseen_words(idn))) if idn.unseen_above is not None else "")
     parts.append(tag("p", tag("small", "± is one standard deviation, the colour of the noise taken into account.")))
     parts.append(drawn.put(roots_chart(idn)))
     parts.append("" if idn.of_responses else response_part(view, drawn))
