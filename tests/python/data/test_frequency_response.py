@@ -81,6 +81,13 @@ def test_text_in_the_units_of_drives(tmp_path: Path) -> None:
     assert found[0].name == "a.csv"
 
 
+def test_the_amplitude_of_a_text_is_kept(tmp_path: Path) -> None:
+    file = table(tmp_path / "a.csv", "f [Hz],real,imag", F, G.real, G.imag)
+    assert ga.read_response(file, amplitude=0.3).amplitude == 0.3 and ga.read_response(file).amplitude is None
+    with pytest.raises(RecordError, match="amplitude=-1"):
+        ga.read_response(file, amplitude=-1.0)
+
+
 def test_text_that_leaves_a_doubt_is_refused(tmp_path: Path) -> None:
     size = np.abs(G)
     no_unit = table(tmp_path / "a.csv", "frequency [Hz],magnitude,phase [deg]", F, size, 0 * F)

@@ -18,7 +18,7 @@ from gaident.data.formats.delimited import TextOptions, open_text
 from gaident.data.formats.table import Column, LogTable
 from gaident.data.frequency.columns import COLUMNS, SI, UNITS
 from gaident.data.frequency.response import FrequencyResponse
-from gaident.data.signals.arrays import sample_time
+from gaident.data.signals.arrays import positive_number, sample_time
 from gaident.errors import ReadError, RecordError
 
 __all__ = ["read_response"]
@@ -36,6 +36,7 @@ def read_response(
     dt: float | None = None,
     *,
     scale: float = 1.0,
+    amplitude: float | None = None,
     name: str | None = None,
     delimiter: str | None = None,
     decimal: str | None = None,
@@ -63,6 +64,8 @@ def read_response(
     scale : float
         What 1 of the file is in rad/s/(N m) (m/s/N; or rad, rad/s^2 per N m, by `kind`); pi/30 for rpm/(N m).
         A negative one turns the sign.
+    amplitude : float, optional
+        Amplitude of the torque that excited the axis [N m], see `FrequencyResponse`.
     name : str, optional
         What reports call it; None: the file's name.
     delimiter, decimal, skip, encoding : optional
@@ -97,6 +100,8 @@ def read_response(
     if scale == 0.0:
         raise ReadError("scale is 0: give what 1 of the file is in SI units; a negative number turns the sign")
     dt = None if dt is None else sample_time(dt)
+    if amplitude is not None:
+        amplitude = positive_number(amplitude, "amplitude", "N m", "give the torque's amplitude, or leave it out")
     table = open_text(str(path), file, TextOptions(delimiter, decimal, skip, encoding))
     if table.batches is not None:
         raise ReadError(f"{path}: too long for a frequency response; give a table of frequencies, or read a log with read()")
@@ -135,7 +140,9 @@ def read_response(
     with np.errstate(over="ignore"):  # the response refuses what is not finite
         response = scale * response[order]
     try:
-        return FrequencyResponse(frequency[order], response, kind=kind, dt=dt, name=called, notes=notes, **arrays)
+        return FrequencyResponse(
+            frequency[order], response, kind=kind, dt=dt, amplitude=amplitude, name=called, notes=notes, **arrays
+        )
     except RecordError as error:
         raise ReadError(f"{table.path}: {error}") from None
 
