@@ -81,3 +81,17 @@ def test_peaks_of_a_shaft_that_rings_faster_than_the_log_resolves_are_no_outlier
     assert dia.verdict == "explained" and "outliers" not in {f.effect for f in dia.findings}, dia.summary()
     assert "integration_rule" in {f.effect for f in dia.findings}
     assert dia.mechanics["inertia"].value == pytest.approx(plant.J + plant.JL, rel=1e-4)
+
+
+@pytest.mark.long
+def test_a_tracking_time_between_those_of_the_grid_is_no_integrator_that_is_held() -> None:
+    """Each time of the grid leaves more than an integrator that is held; the one between two of them leaves next to nothing."""
+    record, validation, controller, truth = industrial_case("tracking", 4, "", 3032000)
+    plant = truth.plant
+    assert isinstance(controller, ga.Cascade) and controller.velocity.anti_windup == "tracking"
+    given = ga.Cascade(ga.PI(plant.kp, plant.ki), period=plant.dt / 4)
+    dia = ga.diagnose(record, controller=given, validation=validation)
+    (windup,) = (f for f in dia.findings if f.effect == "anti_windup")
+    assert windup.parameters["tracking_time"].value == pytest.approx(controller.velocity.tracking_time, rel=1e-3)
+    assert dia.verdict == "explained" and {f.effect for f in dia.causes if f.place != "controller"} == {"torque_lag"}
+    assert dia.mechanics["inertia"].value == pytest.approx(plant.J + plant.JL, rel=1e-4)

@@ -152,16 +152,19 @@ def time_std(records: Sequence[Record], with_time: Callable[[float], Cascade], t
 def _closest(records: Sequence[Record], controller: Cascade, limit: float) -> Cascade:
     """The controller with the anti-windup at a limit with which its torque comes closest to the logged one.
 
-    A tracking time is searched between the neighbours of the best one of a grid.
+    A tracking time is searched between the neighbours of the best one of a grid before it is compared with the other schemes: an
+    integrator that is held may come closer than each time of the grid.
     """
     from scipy.optimize import minimize_scalar
 
-    best = min((run_error(records, one), k, one) for k, one in enumerate(_schemes(controller, limit)))[2]
-    if (time := best.velocity.tracking_time) is None:
-        return best
+    errors = [(run_error(records, one), k, one) for k, one in enumerate(_schemes(controller, limit))]
+    best = min(errors)[2]
+    tracking = min(one for one in errors if one[2].velocity.tracking_time is not None)[2]
+    time = tracking.velocity.tracking_time
+    assert time is not None
 
     def with_time(logarithm: float) -> Cascade:
-        return replace(best, velocity=replace(best.velocity, tracking_time=float(np.exp(logarithm))))
+        return replace(tracking, velocity=replace(tracking.velocity, tracking_time=float(np.exp(logarithm))))
 
     found = minimize_scalar(
         lambda x: run_error(records, with_time(x)),
