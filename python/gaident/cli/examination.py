@@ -16,7 +16,11 @@ from gaident.version import version as own_version
 
 __all__ = ["Examination", "UsedLibrary", "examine"]
 
-_REQUIREMENT = re.compile(r"^([\w.-]+)[^;]*(?:;(.*))?$")
+_REQUIREMENT = re.compile(r"^([\w.-]+)\s*(?:\[[^\]]*\])?\s*\(?([^;)]*)\)?\s*(?:;(.*))?$")
+_LOWEST = re.compile(r"(?:>=|~=|===?|>)\s*([^\s,]+?)(?:\.\*)?\s*(?:,|$)")
+# A version as packages write it: numbers, then what makes it earlier (a, b, rc, dev) or later (post, a local part) than these.
+_VERSION = re.compile(r"v?(?:\d+!)?(\d+(?:\.\d+)*)(.*)", re.IGNORECASE)
+_EARLIER = re.compile(r"[._-]?(?:a|alpha|b|beta|c|rc|pre|preview|dev)[._-]?\d*", re.IGNORECASE)
 _EXTRA = re.compile(r"extra\s*==\s*['\"]([\w.-]+)['\"]")
 _MODULES = {"pillow": "PIL"}  # what is imported, where it is not the distribution's name
 _FOR_DEVELOPERS = {"test", "peers", "compare", "naming", "tidy", "docs", "release"}
@@ -24,12 +28,16 @@ _FOR_DEVELOPERS = {"test", "peers", "compare", "naming", "tidy", "docs", "releas
 
 @dataclass(frozen=True)
 class UsedLibrary:
-    """A library that this package uses; version None: it is not there. extra: what installs it, "" if it is required."""
+    """A library that this package uses; version None: it is not there. extra: what installs it, "" if it is required.
+
+    lowest: the version that it must have at least, "" for any.
+    """
 
     name: str
     version: str | None
     extra: str
     flaw: str = ""
+    lowest: str = ""
 
 
 @dataclass(frozen=True)
@@ -65,14 +73,16 @@ class Examination:
         lines += ["", "needed"] + [f"  {x.name.ljust(width)}{x.flaw or x.version}" for x in needed] if needed else []
         if optional:
             missing = 'not installed: pip install "gaident[{}]"'
-            lines += ["", "optional"] + [f"  {x.name.ljust(width)}{x.version or missing.format(x.extra)}" for x in optional]
+            lines += ["", "optional"] + [
+                f"  {x.name.ljust(width)}{x.flaw or x.version or missing.format(x.extra)}" for x in optional
+            ]
         return "\n".join([*lines, "", f"self test: {self.self_test}", *(f"WRONG: {flaw}" for flaw in self.flaws)])
 
 
 def examine() -> Examination:
     """Looks at this installation; never raises."""
     libraries = tuple(_libraries())
-    flaws = [f'{x.name} {x.flaw}: pip install --upgrade "{x.name}"' for x in libraries if x.flaw]
+    flaws = [f'{x.name} {x.flaw}: pip install --upgrade "{x.name}{x.lowest and f">={x.lowest}"}"' for x in libraries if x.flaw]
     try:
         instructions, verdict, right = _self_test()
     except Exception as error:  # whatever is broken, this is what is asked here
@@ -105,26 +115,42 @@ def _libraries() -> list[UsedLibrary]:
         match = _REQUIREMENT.match(requirement)
         if match is None:
             continue
-        name, marker = match[1], match[2] or ""
+        name, marker = match[1], match[3] or ""
         extra = _EXTRA.search(marker)
         if (extra is not None and extra[1] in _FOR_DEVELOPERS) or "python_version" in marker or name in (*found, "gaident"):
             continue
-        found[name] = _library(name, "" if extra is None else extra[1])
+        lowest = _LOWEST.search(match[2])
+        found[name] = _library(name, "" if extra is None else extra[1], "" if lowest is None else lowest[1])
     return sorted(found.values(), key=lambda x: (bool(x.extra), x.extra, x.name))
 
 
-def _library(name: str, extra: str) -> UsedLibrary:
+def _library(name: str, extra: str, lowest: str) -> UsedLibrary:
     try:
         version = metadata.version(name)
     except metadata.PackageNotFoundError:
-        return UsedLibrary(name, None, extra, "" if extra else "is not installed")
+        return UsedLibrary(name, None, extra, "" if extra else "is not installed", lowest)
+    if below(version, lowest):
+        return UsedLibrary(name, version, extra, f"is {version}, and {lowest} is the oldest that gaident works with", lowest)
     if extra:
-        return UsedLibrary(name, version, extra)
+        return UsedLibrary(name, version, extra, lowest=lowest)
     try:
         importlib.import_module(_MODULES.get(name.lower(), name.replace("-", "_")))
     except Exception as error:
-        return UsedLibrary(name, version, extra, f"cannot be imported ({type(error).__name__}: {error})")
-    return UsedLibrary(name, version, extra)
+        return UsedLibrary(name, version, extra, f"cannot be imported ({type(error).__name__}: {error})", lowest)
+    return UsedLibrary(name, version, extra, lowest=lowest)
+
+
+def below(version: str, lowest: str) -> bool:
+    """Whether a version is an earlier one than the lowest that is asked for; False where one of them is no version."""
+    ours, asked = _VERSION.match(version), _VERSION.match(lowest)
+    if ours is None or asked is None:
+        return False
+    numbers = [[int(part) for part in found[1].split(".")] for found in (ours, asked)]
+    longest = max(map(len, numbers))
+    have, need = (part + [0] * (longest - len(part)) for part in numbers)
+    # 2.0rc1 comes before 2.0; of two that come before it, either will do: nobody asks for a certain one of these.
+    early = _EARLIER.match(ours[2]) is not None and _EARLIER.match(asked[2]) is None
+    return have < need or (have == need and early)
 
 
 def _self_test() -> tuple[str, str, bool]:

@@ -365,6 +365,32 @@ def test_doctor_tells_what_is_there(capsys: pytest.CaptureFixture[str], monkeypa
     assert "WRONG: no-such-thing is not installed: pip install" in out
 
 
+def test_doctor_finds_what_is_too_old(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
+    here = doctor.metadata.version("scipy")
+    listed = ["scipy>=99", "numpy>=1,!=1.2 ; python_version > '3'", 'h5py (>=98.1.2); extra == "hdf5"']
+    monkeypatch.setattr(doctor.metadata, "requires", lambda _: listed)
+    assert main(["doctor"]) == 1
+    out = capsys.readouterr().out
+    assert f"scipy is {here}, and 99 is the oldest that gaident works with" in out
+    assert 'pip install --upgrade "scipy>=99"' in out and 'pip install --upgrade "h5py>=98.1.2"' in out
+    assert out.count("WRONG") == 2
+    monkeypatch.setattr(doctor.metadata, "requires", lambda _: [f"scipy>={here}", "numpy[extra] >1.2", "pillow~=9.0"])
+    assert main(["doctor"]) == 0
+
+
+@pytest.mark.parametrize(
+    ("version", "lowest", "early"),
+    [
+        *(("1.15", "1.15", False), ("1.15.0", "1.15", False), ("1.9.3", "1.15", True), ("1.15.3", "1.16", True)),
+        *(("2.0", "1.99.9", False), ("2.0rc1", "2.0", True), ("2.0.dev0+g12", "2", True), ("2.0.post1", "2.0", False)),
+        *(("2.0+local", "2.0", False), ("2.1rc1", "2.0", False), ("2.0rc2", "2.0rc1", False), ("1.0", "", False)),
+        *(("unknown", "1", False), ("10.0", "9.2", False)),
+    ],
+)
+def test_versions_are_compared_by_their_numbers(version: str, lowest: str, early: bool) -> None:
+    assert doctor.below(version, lowest) == early
+
+
 @pytest.mark.parametrize("shell", ["bash", "zsh", "fish", "tcsh"])
 def test_completion_knows_commands_and_options(shell: str, capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
     pytest.importorskip("shtab")
