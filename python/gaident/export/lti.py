@@ -29,6 +29,7 @@ __all__ = ["in_a_row", "to_control", "to_scipy"]
 
 Matrix = NDArray[np.float64]
 
+MOST_WAITING = 2000  # no decision: memory: states of a delay, whose matrix has their square
 HIGHEST_PADE = 10  # no decision: beyond, the approximation's own poles are lost in rounding; what an argument may be
 
 
@@ -115,7 +116,12 @@ def _sampled(chain: Transfer, dt: float) -> tuple[Matrix, Matrix, Matrix, Matrix
     def over(share: float) -> tuple[Matrix, Matrix]:
         M = np.zeros((n + 1, n + 1))
         M[:n, :n], M[:n, n] = A * share, B * share
-        E = expm(M)
+        with np.errstate(over="ignore", invalid="ignore"):
+            E = expm(M)
+        if not np.all(np.isfinite(E)):
+            raise ModelError(
+                f"dt is {dt:g}: within one such step a pole of the model grows beyond all numbers; give a shorter dt"
+            )
         return E[:n, :n], E[:n, n]
 
     samples = chain.delay / dt
@@ -126,6 +132,11 @@ def _sampled(chain: Transfer, dt: float) -> tuple[Matrix, Matrix, Matrix, Matrix
     early, G_early = over(f)
     G1 = late @ G_early
     waiting = d + (f > 0.0)
+    if waiting > MOST_WAITING:
+        raise ModelError(
+            f"dt is {dt:g}: the delay of {chain.delay:g} s has {waiting} states at it, and {MOST_WAITING} may be; "
+            "give a longer dt"
+        )
     F, G, H = np.zeros((n + waiting, n + waiting)), np.zeros((n + waiting, 1)), np.zeros((1, n + waiting))
     F[:n, :n] = late @ early
     H[0, :n] = C

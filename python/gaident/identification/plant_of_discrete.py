@@ -75,7 +75,10 @@ def plant_of_discrete(
         gain, s_poles, s_zeros = _held_to_s(b / a[0], poles, dt)
     if not np.all(np.isfinite(np.r_[gain, s_poles, s_zeros])) or gain == 0.0:
         return Plant(None, misfit, "the polynomial has coinciding poles, none that acts, or a root at z = -1")
-    return Plant(Model(gain, _paired(s_poles), _paired(s_zeros)), misfit, "")
+    try:
+        return Plant(Model(gain, _paired(s_poles), _paired(s_zeros)), misfit, "")
+    except ModelError as reason:  # a gain or a root that no drive has
+        return Plant(None, misfit, f"the polynomial is none of a drive: {reason}")
 
 
 def _plant_in_z(

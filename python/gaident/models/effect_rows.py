@@ -21,7 +21,7 @@ import numpy as np
 
 from gaident import _core
 from gaident.axis import Text
-from gaident.checks import known_keys, one_of, real_number
+from gaident.checks import LARGEST, known_keys, one_of, real_number
 from gaident.errors import ModelError
 from gaident.models.own_effects import Parameter
 
@@ -259,4 +259,6 @@ def checked_value(row: Row, parameter: Parameter, value: object) -> float:
     low = number <= parameter.lowest if parameter.above_lowest else number < parameter.lowest
     if low or number > parameter.highest:
         raise ModelError(f"{what} is {number:g}: give a number{bounds} {unit}")
+    if abs(number) > LARGEST:
+        raise ModelError(f"{what} is {number:g}, which no drive has ({LARGEST:g} at most): give a number{bounds} {unit}")
     return number

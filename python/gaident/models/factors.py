@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 from gaident.errors import ModelError
 from gaident.models.effect_rows import SIDES
 from gaident.models.model import Model
-from gaident.models.roots import quadratic_roots
+from gaident.models.roots import check_sizes, quadratic_roots
 
 
 class FactorCounts(NamedTuple):
@@ -97,6 +97,8 @@ def factor_parameters(model: Model) -> tuple[tuple[str, ...], NDArray[np.float64
     """
     if not all(hasattr(model, name) for name in ("gain", "poles", "zeros", "p")):
         raise ModelError(f"model is a {type(model).__name__}: give a gaident.Model")
+    for kind, roots in (("poles", model.poles), ("zeros", model.zeros)):
+        check_sizes(roots, f"{kind} of model")
     names, values, units = ["gain"], [model.gain], [gain_unit(model.p)]
     for kind, roots in (("pole", model.poles), ("zero", model.zeros)):
         for i, root in enumerate((r for r in roots if r.imag == 0.0), start=1):
@@ -130,7 +132,7 @@ def model_from_factor_parameters(values: ArrayLike, structure: FactorCounts) -> 
     Raises
     ------
     ModelError
-        For a vector of the wrong length, or a value that is not finite.
+        For a vector of the wrong length, a value that is not finite, and one that no drive has, see `Model`.
 
     Examples
     --------

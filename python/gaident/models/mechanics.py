@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from gaident.axis import Text, say, unit_text
-from gaident.checks import known_keys, one_of, real_number, yes_or_no
+from gaident.checks import LARGEST, known_keys, one_of, real_number, yes_or_no
 from gaident.errors import ModelError
 from gaident.models import two_mass
 from gaident.models.factors import FactorCounts
@@ -61,8 +61,13 @@ class OneMass:
             object.__setattr__(self, name, value)
 
     def model(self) -> Model:
-        """Return the factored model: K = 1/J, A11 = D/J (equation 4)."""
-        return Model(1.0 / self.J, [-self.D / self.J])
+        """Return the factored model: K = 1/J, A11 = D/J (equation 4); raise ModelError where no drive has such numbers."""
+        if self.J == 0.0:
+            raise ModelError(f"J is {self.J:g}: without inertia there is no one-mass model")
+        try:
+            return Model(1.0 / self.J, [-self.D / self.J])
+        except ModelError as error:
+            raise ModelError(f"J is {self.J:g} and D is {self.D:g}: {error}") from None
 
     @classmethod
     def from_model(cls, model: Model) -> OneMass:
@@ -156,7 +161,11 @@ class TwoMass:
             c = two_mass.coefficients_of_mechanics(self._vector())
             if not np.all(np.isfinite(c)):
                 raise ModelError(f"{self}: a coefficient of its transfer function is beyond all numbers; correct the values")
-            return Model(c[0], polynomial_roots(c[1:4]), polynomial_roots(c[4:6]))
+            roots = polynomial_roots(c[1:4]), polynomial_roots(c[4:6])
+        try:
+            return Model(c[0], *roots)
+        except ModelError as error:
+            raise ModelError(f"{self}: {error}") from None
 
     @classmethod
     def from_model(cls, model: Model, free_shaft_damping: bool = False) -> TwoMass:
@@ -183,7 +192,8 @@ class TwoMass:
         yes_or_no(free_shaft_damping, "free_shaft_damping", ModelError)
         found = _two_masses(model, None)
         if found is None:
-            raise ModelError("zeros has a root at 0: no stiffness between two masses gives that; use a one-mass model")
+            what = "zeros has a root at 0" if 0.0 in model.zeros else f"{model!r} has roots too far apart"
+            raise ModelError(f"{what}: no stiffness between two masses gives that; use a one-mass model")
         if not free_shaft_damping:
             return found
         if found.with_shaft_damping is None:
@@ -255,7 +265,7 @@ def mechanics_from_model(model: Model, covariance: ArrayLike | None = None) -> M
     Returns
     -------
     OneMass, TwoMass or None
-        The mechanism; None also for two masses with a zero at 0, which no stiffness gives.
+        The mechanism; None also for two masses with a zero at 0, which no stiffness gives, or with roots that are too far apart.
         Its `inconsistency` is abs(1 - K_G by product / K_G by pairwise): how far the two equations for the stiffness are apart;
         compare it with std["inconsistency"].
         Its `with_shaft_damping` meets all six numbers.
@@ -339,8 +349,11 @@ def _checked(drive: Mechanics, positive: tuple[str, ...], not_negative: tuple[st
         found[name] = value
         # What an identification found is data, however odd: see `notes`.
         if drive.inconsistency is None and (value < 0.0 or (value == 0.0 and name in positive)):
-            least = "> 0" if name in positive else ">= 0"
-            raise ModelError(f"{name} is {value:g}: give a number {least} in {unit}")
+            bound = "> 0" if name in positive else ">= 0"
+            raise ModelError(f"{name} is {value:g}: give a number {bound} in {unit}")
+        least = 1.0 / LARGEST if name in positive else 0.0
+        if drive.inconsistency is None and not least <= value <= LARGEST:
+            raise ModelError(f"{name} is {value:g}, which no drive has ({least:g} to {LARGEST:g}): give it in {unit}")
     return found
 
 

@@ -20,7 +20,7 @@ from gaident.errors import ModelError
 from gaident.models.discrete import Discrete, require_strictly_proper
 from gaident.models.effects import Effect, checked_effects, without
 from gaident.models.effects_linear import LINEAR, Transfer, frequencies, response_of
-from gaident.models.roots import Mode, canonical_roots, modes_of, roots_of, text_of
+from gaident.models.roots import Mode, canonical_roots, checked_gain, modes_of, ratio_of_products, roots_of, text_of
 from gaident.providers import provided
 
 Roots = Sequence[complex] | NDArray[np.complex128] | NDArray[np.float64]
@@ -50,7 +50,8 @@ class Model:
     Raises
     ------
     ModelError
-        For a gain of 0, roots without their conjugates, more zeros than poles, and effects that the model cannot carry.
+        For a gain of 0 or of a size below 1e-90 or above 1e90, roots beyond 1e15 rad/s or without their conjugates, more zeros
+        than poles, and effects that the model cannot carry.
 
     Examples
     --------
@@ -69,10 +70,7 @@ class Model:
     effects: tuple[Effect, ...]
 
     def __init__(self, gain: float, poles: Roots = (), zeros: Roots = (), effects: Iterable[Effect] = ()) -> None:
-        number = real_number(gain, "gain", ModelError, "give one finite real number, not 0")
-        if number == 0.0:
-            raise ModelError("gain is 0: such a model never moves; give one finite real number, not 0")
-        object.__setattr__(self, "gain", number)
+        object.__setattr__(self, "gain", checked_gain(gain))
         object.__setattr__(self, "poles", canonical_roots(poles, "poles"))
         object.__setattr__(self, "zeros", canonical_roots(zeros, "zeros"))
         if len(self.zeros) > len(self.poles):
@@ -200,9 +198,7 @@ class Model:
         integrators = self.poles.count(0.0) - self.zeros.count(0.0)
         if integrators < 0:
             return 0.0
-        numerator = math.prod((-zero for zero in self.zeros if zero != 0.0), start=1.0 + 0.0j)
-        denominator = math.prod((-pole for pole in self.poles if pole != 0.0), start=1.0 + 0.0j)
-        value = self.gain * (numerator / denominator).real
+        value = self.gain * ratio_of_products(self.zeros, self.poles)
         return value if integrators == 0 else math.copysign(math.inf, value)
 
     @property
@@ -249,7 +245,10 @@ class Model:
         controller = checked_pi(controller, "equation (7) is")
         require_strictly_proper(self.p, controller)
         poles, zeros = (np.array(roots, dtype=np.complex128) for roots in (self.poles, self.zeros))
-        return Discrete(*core.discrete(self.gain, poles, zeros, sample_time, controller))
+        found = Discrete(*core.discrete(self.gain, poles, zeros, sample_time, controller))
+        if not np.all(np.isfinite([*found.alpha, *found.beta])):
+            raise ModelError(f"dt is {sample_time:g}: within one such step the model grows beyond all numbers; give a shorter dt")
+        return found
 
     def to_scipy(self, dt: float | None = None, *, pade: int | None = None) -> Any:
         """Return the same as a linear system of scipy.signal, torque [N m] to velocity [rad/s].

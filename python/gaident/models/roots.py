@@ -9,12 +9,16 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from gaident.checks import real_number
 from gaident.errors import ModelError
 
 # Rounding in text files and root finders stays far below this; a wrong digit in a table stays far above.
 ASYMMETRY = 1e-9  # no decision: rounding
 # An imaginary part this small cannot be told from rounding of the root itself.
 NO_IMAGINARY_PART = 1e-13  # no decision: rounding
+# So large that no drive is refused, so small that the polynomials of 14 roots times a gain are numbers.
+LARGEST_ROOT = 1e15  # no decision: what an argument may be [rad/s]
+LARGEST_GAIN = 1e90  # no decision: what an argument may be [(rad/s)^(p+1)/(N m)]
 
 
 class Mode(NamedTuple):
@@ -50,10 +54,32 @@ class Mode(NamedTuple):
         return self.natural_frequency / (2.0 * math.pi)
 
 
+def checked_gain(gain: object) -> float:
+    """The gain as a finite float that a drive can have; raises ModelError."""
+    number = real_number(gain, "gain", ModelError, "give one finite real number, not 0")
+    if number == 0.0:
+        raise ModelError("gain is 0: such a model never moves; give one finite real number, not 0")
+    if not 1.0 / LARGEST_GAIN <= abs(number) <= LARGEST_GAIN:
+        raise ModelError(
+            f"gain is {number:g}, whose size no drive has ({1.0 / LARGEST_GAIN:g} to {LARGEST_GAIN:g}): correct its unit, or "
+            "take out a pole or a zero that is far beyond the others"
+        )
+    return number
+
+
+def check_sizes(roots: Iterable[complex], name: str) -> None:
+    """Raises ModelError for a root that is larger than any drive has."""
+    for i, root in enumerate(roots):
+        if max(abs(root.real), abs(root.imag)) > LARGEST_ROOT:
+            raise ModelError(
+                f"{name}[{i}] is {root:g}, which no drive has ({LARGEST_ROOT:g} rad/s at most): give it in rad/s, or leave it out"
+            )
+
+
 def canonical_roots(roots: object, name: str) -> tuple[complex, ...]:
     """Reals by ascending magnitude, then conjugate pairs likewise, positive imaginary part first.
 
-    Raises ModelError, naming the argument and the root, where a root is not finite or has no partner.
+    Raises ModelError, naming the argument and the root, where a root is not finite, beyond all drives, or has no partner.
     """
     if isinstance(roots, (str, bytes)):
         raise ModelError(f"{name} is {roots!r}: give a list of numbers in rad/s")
@@ -66,6 +92,7 @@ def canonical_roots(roots: object, name: str) -> tuple[complex, ...]:
     for i, root in enumerate(values):
         if not np.isfinite(root):
             raise ModelError(f"{name}[{i}] is {root}: every root must be finite")
+    check_sizes(values.tolist(), name)
 
     flat = np.abs(values.imag) <= NO_IMAGINARY_PART * np.abs(values)
     reals = [float(r.real) for r in values[flat]]
@@ -162,6 +189,17 @@ def modes_of(kind: str, roots: Iterable[complex]) -> Iterator[Mode]:
             magnitude = abs(root)
             damping = -root.real / magnitude if magnitude else math.nan
             yield Mode(kind, root, magnitude, damping)
+
+
+def ratio_of_products(zeros: Sequence[complex], poles: Sequence[complex]) -> float:
+    """prod(-zeros)/prod(-poles) of the roots that are not 0; infinite where the poles are so near 0 that their product is 0."""
+    numerator = math.prod((-zero for zero in zeros if zero != 0.0), start=1.0 + 0.0j)
+    denominator = math.prod((-pole for pole in poles if pole != 0.0), start=1.0 + 0.0j)
+    if denominator != 0.0:
+        return (numerator / denominator).real
+    # Pairs have a positive product.
+    right = sum(root.imag == 0.0 and root.real > 0.0 for root in (*zeros, *poles))
+    return -math.inf if right % 2 else math.inf
 
 
 def text_of(roots: tuple[complex, ...]) -> str:

@@ -38,8 +38,18 @@ class TwoMassFit(NamedTuple):
 def fit_two_masses(model: Model, cov: Matrix | None) -> TwoMassFit | None:
     """The mechanics of a model with p = 1, q = 2; `cov` (6 x 6) over its natural parameters (factors.py).
 
-    None where a zero of the model lies at 0: then K_G is 0 and there is no second mass to speak of.
+    None where a zero of the model lies at 0: then K_G is 0 and there is no second mass to speak of; and where its roots are so
+    far apart that a mass or the stiffness is beyond all numbers.
     """
+    try:
+        with np.errstate(over="raise", divide="raise", invalid="raise"):
+            return _fitted(model, cov)
+    except (FloatingPointError, np.linalg.LinAlgError):
+        return None
+
+
+def _fitted(model: Model, cov: Matrix | None) -> TwoMassFit | None:
+    """See `fit_two_masses`; raises FloatingPointError and LinAlgError."""
     _, x, units = factor_parameters(model)
     structure = FactorCounts.of(model)
     c = coefficients_of_parameters(x, structure)

@@ -19,6 +19,7 @@ import math
 
 from gaident.control.cascade import Cascade
 from gaident.control.filters import LowPass
+from gaident.errors import ModelError
 from gaident.models.effects_linear import LINEAR
 from gaident.models.model import Model
 
@@ -56,7 +57,11 @@ def rigid_axis(model: Model) -> tuple[float, float]:
     others.remove(slow)
     above = math.prod((abs(pole) for pole in others), start=1.0)
     below = math.prod((abs(zero) for zero in mechanism.zeros if zero != 0.0), start=1.0)
-    inertia = above / (abs(mechanism.gain) * below)
+    inertia = above / (abs(mechanism.gain) * below) if below else math.inf
+    if not 0.0 < inertia < math.inf:
+        raise ModelError(
+            f"model is {model!r:.200}: its roots are so far apart that no axis has their inertia; leave out the far ones"
+        )
     return inertia, -slow.real * inertia
 
 

@@ -9,6 +9,7 @@ import warnings
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -45,6 +46,10 @@ HOSTILE: list[Any] = [
     *("x", "", b"x", "a\0b", object(), int, Ellipsis, lambda *_: None, range(3)),
     *([], [1], [1, 2, 3], (), {}, {"a": 1}),
     *(np.zeros(0), np.zeros((2, 2)), np.array(["a"]), np.float64(1e308), np.full(N, np.nan), np.full(N, 1e200)),
+    *([[]], [[1, 2], [3]], [[[1.0]]], [None], [["x"]], [[1e300, -1e300]], ([],), {"a": [1, [2]]}, [{"a": 1}], [np.zeros(2)]),
+    *(ga.Model(1e90, [-1e15, -1.0], [-1e15]), ga.Model(1e-90, [1e15]), ga.Model(-1.0, [0.0, -1e-200], [-1e-200])),
+    *(ga.Model(1.0, 14 * [-1e15], 7 * [-1e15]), ga.Model(1.0, [-1e15 + 1e15j, -1e15 - 1e15j, 0.0], [0.0, -1e-200])),
+    ga.Model(1.0, [-1.0]).with_effect("coulomb_friction", torque=1e30),
 ]
 
 BAND = np.geomspace(1.0, 100.0, 20)
@@ -316,6 +321,19 @@ def test_every_public_function_has_a_row() -> None:
         ("TwoMass.from_model", {"free_shaft_damping": "no"}, "free_shaft_damping is 'no': give True or False"),
         ("Parameter", {"logarithmic": None}, "logarithmic of size of mine is None: give True or False"),
         ("idn.plot_bode", {"hz": "no"}, "hz is 'no': give True or False"),
+        ("Model", {"gain": 1e300}, r"gain is 1e\+300, whose size no drive has .*: correct its unit"),
+        ("Model", {"gain": -1e-91}, r"gain is -1e-91, whose size no drive has"),
+        ("Model", {"poles": [-1.0, -1e200]}, r"poles\[1\] is -1e\+200.*, which no drive has .*: give it in rad/s"),
+        ("Model", {"zeros": [-1e250]}, r"zeros\[0\] is -1e\+250.*, which no drive has"),
+        ("OneMass", {"J": 1e300}, r"J is 1e\+300, which no drive has"),
+        ("OneMass", {"J": 1e-20, "D": 1e20}, r"J is 1e-20 and D is 1e\+20: poles\[0\] is -1e\+40"),
+        ("with_effect", {"torque": 1e300}, r"torque of coulomb_friction is 1e\+300, which no drive has"),
+        (
+            "factor_parameters",
+            {"model": SimpleNamespace(gain=1.0, poles=[-1e200 + 1e200j, -1e200 - 1e200j], zeros=[], p=2)},
+            r"poles of model\[0\] is -1e\+200.*, which no drive has",
+        ),
+        ("discrete", {"dt": 1e300}, r"dt is 1e\+300"),
     ],
 )
 def test_what_would_be_nonsense_is_refused_by_name(name: str, changed: dict[str, Any], message: str, here: Path) -> None:
@@ -348,6 +366,21 @@ def test_sizes_beyond_all_drives_are_refused_by_name() -> None:
         ga.align(REC, {"velocity": REC.velocity}, dt=1e3)
     slow = ga.first_experiment(1e-3, ga.Limits(80.0, 2.4), inertia=1e12, kp=0.02)
     assert len(slow.command) < 50_000 and np.abs(slow.command).max() < 80.0  # ramps of an axis that no torque moves
+
+
+def test_models_at_the_ends_of_what_may_be_are_simulated_in_numbers() -> None:
+    """A gain of 1e300 with roots of 1e200 and 1e250 was NaN without a word, and its axis had no inertia."""
+    for model in (ga.Model(1e15, [-1.0, -1e15]), ga.Model(1e-90, [-1e15], []), ga.Model(1.0, [-1e15, -1.0], [-1e15])):
+        assert np.all(np.isfinite(ga.simulate(model, REC))) and np.all(np.isfinite(model.discrete(1e-3).beta))
+        assert ga.joint_parameters(model).inertia > 0.0 if model.p == 1 else model.to_control() is not None
+    unstable = ga.Model(1.0, [1e15])
+    for sampled in (unstable.discrete, unstable.to_scipy, unstable.to_control):
+        with pytest.raises(ga.GaidentError, match=r"dt is 0\.001: within one such step .* grows beyond all numbers"):
+            sampled(1e-3)
+    assert ga.Model(1.0, 2 * [-1e-200]).static_gain == np.inf and ga.Model(1.0, [-1e-200, -1e-200, 1e-200]).static_gain == -np.inf
+    assert ga.TwoMass(1e-4, 0.1, 1e-4, 0.1, 2.0).model().static_gain > 0.0
+    with pytest.raises(ga.GaidentError, match=r"dt is 1e-12: the delay of 1 s has .* states at it"):
+        ONE.with_effect("transport_delay", delay=1.0).to_scipy(1e-12)
 
 
 @pytest.mark.parametrize("period", [4e-10, 1e-5])
