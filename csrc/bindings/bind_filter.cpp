@@ -26,10 +26,8 @@ RealArray filtered_rows(const RealArray& b, const RealArray& a, const RealArray&
                                     " more");
     RealArray out({values.shape(0), values.shape(1)});
     double* const v = out.mutable_data();
-    {
-        const ReleasedGil released;
-        filtered(view(b), view(a), values.data(), v, rows, n, lengths);
-    }
+    std::atomic<bool> stop{false};
+    run_interruptibly(stop, rows * n, [&] { filtered(view(b), view(a), values.data(), v, rows, n, lengths, &stop); });
     return out;
 }
 
@@ -50,11 +48,10 @@ RealArray powers_of(const RealArray& b, const RealArray& a, const RealArray& e, 
     if (weight.size() != e.size()) throw std::invalid_argument("weight: one number for each sample of e");
     RealArray out(b.shape(0));
     double* const sums = out.mutable_data();
-    {
-        const ReleasedGil released;
-        filtered_powers(b.data(), a.data(), static_cast<std::size_t>(b.shape(0)), static_cast<std::size_t>(b.shape(1)), e.data(),
-                        weight.data(), lengths, sums);
-    }
+    const auto filters = static_cast<std::size_t>(b.shape(0)), size = static_cast<std::size_t>(b.shape(1));
+    std::atomic<bool> stop{false};
+    run_interruptibly(stop, filters * n,
+                      [&] { filtered_powers(b.data(), a.data(), filters, size, e.data(), weight.data(), lengths, sums, &stop); });
     return out;
 }
 
@@ -72,10 +69,8 @@ RealArray smoothed_rows(const RealArray& sections, const RealArray& values, std:
     if (extension >= n) throw std::invalid_argument("extension: fewer samples than the " + std::to_string(n) + " of a row");
     RealArray out({values.shape(0), values.shape(1)});
     double* const v = out.mutable_data();
-    {
-        const ReleasedGil released;
-        zero_phase(all, values.data(), v, rows, n, extension);
-    }
+    std::atomic<bool> stop{false};
+    run_interruptibly(stop, rows * n, [&] { zero_phase(all, values.data(), v, rows, n, extension, &stop); });
     return out;
 }
 
@@ -99,18 +94,19 @@ ComplexArray states(const ComplexArray& A, const ComplexArray& drive, const Comp
     ComplexArray out({drive.shape(0), m});
     std::complex<double>* const x = out.mutable_data();
     std::copy_n(drive.data(), drive.size(), x);
-    {
-        const ReleasedGil released;
-        state_recursion(A.data(), {start.data(), static_cast<std::size_t>(m)}, x, static_cast<std::size_t>(drive.shape(0)),
-                        newest);
-    }
+    const std::size_t states = static_cast<std::size_t>(m), n = static_cast<std::size_t>(drive.shape(0));
+    std::atomic<bool> stop{false};
+    run_interruptibly(stop, n * states, [&] { state_recursion(A.data(), {start.data(), states}, x, n, newest, &stop); });
     return out;
 }
 
 RealArray products(const RealArray& e, int lags) {
     if (lags < 0) throw std::invalid_argument("lags: 0 or more");
     RealArray out(lags + 1);
-    lagged_products(e.data(), static_cast<std::size_t>(e.size()), {out.mutable_data(), static_cast<std::size_t>(lags) + 1});
+    const std::size_t n = static_cast<std::size_t>(e.size()), count = static_cast<std::size_t>(lags) + 1;
+    const std::span<double> sums{out.mutable_data(), count};
+    std::atomic<bool> stop{false};
+    run_interruptibly(stop, n * count, [&] { lagged_products(e.data(), n, sums, &stop); });
     return out;
 }
 

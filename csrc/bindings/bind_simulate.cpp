@@ -8,9 +8,10 @@ namespace {
 
 // In a drive's arithmetic; the torque is the controller's answer to the velocity, in double.
 void simulate_mirrored(const Factors<double>& g, std::span<const double> input, const Clock& clock, const Loop& loop,
-                       const double* start, const std::string& arithmetic, std::span<double> velocity, std::span<double> torque) {
+                       const double* start, const std::string& arithmetic, std::span<double> velocity, std::span<double> torque,
+                       const std::atomic<bool>& stop) {
     if (start != nullptr) throw std::invalid_argument("initial_state: in arithmetic '" + arithmetic + "' a model starts at rest");
-    mirror_velocity(arithmetic, false, g, input, clock.period, loop, velocity);
+    mirror_velocity(arithmetic, false, g, input, clock.period, loop, velocity, &stop);
     ControllerState<double> controller(loop.controller, clock);
     for (std::size_t k = 0; k < input.size(); ++k) torque[k] = controller.step(input[k] - velocity[k]);
 }
@@ -45,7 +46,7 @@ py::tuple simulate_model(double gain, const ComplexArray& poles, const ComplexAr
     run_interruptibly(stop, in.size(), [&] {
         if (arithmetic == "double") simulate<double>(g, in, clock.period, loop, start, w, u, &stop);
         else if (arithmetic == "float") simulate_in_float(g, in, clock.period, loop, start, w, u, &stop);
-        else simulate_mirrored(g, in, clock, loop, start, arithmetic, w, u);
+        else simulate_mirrored(g, in, clock, loop, start, arithmetic, w, u, stop);
     });
     return py::make_tuple(velocity, torque);
 }

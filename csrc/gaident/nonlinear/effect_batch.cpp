@@ -123,27 +123,63 @@ private:
             lanes.s[lane] = c.s;
         }
         const auto& kernels = kernels_named(job_.kernel->name)->in_double;
-        std::vector<double> y(samples_ * DoubleGroup::width);
-        if (job_.loop.limited()) {
-            kernels.stepped_outputs(lanes, ControllerState<double>(job_.loop.controller, Clock{job_.record.sample_time}),
-                                    record.input.data(), samples_, y.data());
-        } else {
-            kernels.outputs(lanes, record.input.data(), samples_, y.data());
+        std::vector<double> y(std::min(samples_, samples_between_stops) * DoubleGroup::width);
+        const ControllerState<double> controller(job_.loop.controller, Clock{job_.record.sample_time});
+        for (std::size_t k = 0; k < samples_; k += samples_between_stops) {
+            stop_if_asked(job_.stop);
+            const std::size_t n = std::min(samples_ - k, samples_between_stops);
+            if (job_.loop.limited()) kernels.stepped_outputs(lanes, controller, record.input.data() + k, n, y.data());
+            else kernels.outputs(lanes, record.input.data() + k, n, y.data());
+            spread(group, y.data(), 0, out_.velocity, k, n, DoubleGroup::width, Write::set);
         }
-        spread(group, y, out_.velocity, DoubleGroup::width, Write::set);
     }
 
-    void spread(std::span<const std::size_t> group, const std::vector<double>& from, double* to, std::size_t width,
-                Write write) const {
+    // Lanes side by side, from the sample `at` on, into the rows of the group from the sample `first` on.
+    void spread(std::span<const std::size_t> group, const double* from, std::size_t at, double* to, std::size_t first,
+                std::size_t count, std::size_t width, Write write) const {
         if (to == nullptr) return;
         for (std::size_t lane = 0; lane < group.size(); ++lane) {
-            double* const out = row(to, group[lane]);
-            for (std::size_t k = 0; k < samples_; ++k) {
-                const double v = from[k * width + lane] + 0.0;  // at rest 0, not -0
+            double* const out = row(to, group[lane]) + first;
+            for (std::size_t k = 0; k < count; ++k) {
+                const double v = from[(at + k) * width + lane] + 0.0;  // at rest 0, not -0
                 out[k] = write == Write::set ? v : write == Write::add ? out[k] + v : out[k] - v;
             }
         }
     }
+
+    // Spreads what a run has written since it was last asked.
+    class Spread final : public EffectSink {
+    public:
+        Spread(const Job& job, std::span<const std::size_t> group, std::size_t width) : job_(job), group_(group), width_(width) {}
+
+        // A signal, in lanes side by side, and the rows that it is of; null where it is not asked for.
+        double* signal(double* rows, Write write) {
+            if (rows == nullptr) return nullptr;
+            signals_.push_back({std::vector<double>(effect_block * width_), rows, write});
+            return signals_.back().lanes.data();
+        }
+        bool take(std::size_t n) override {
+            const std::size_t every = static_cast<std::size_t>(job_.job_.record.log_every);
+            const std::size_t end = std::min((n + every - 1) / every, job_.samples_);
+            while (taken_ < end) {
+                const std::size_t at = taken_ % effect_block, count = std::min(end - taken_, effect_block - at);
+                for (const Signal& s : signals_) job_.spread(group_, s.lanes.data(), at, s.rows, taken_, count, width_, s.write);
+                taken_ += count;
+            }
+            return job_.job_.stop == nullptr || !job_.job_.stop->load(std::memory_order_relaxed);
+        }
+
+    private:
+        struct Signal {
+            std::vector<double> lanes;
+            double* rows;
+            Write write;
+        };
+        const Job& job_;
+        std::span<const std::size_t> group_;
+        std::size_t width_, taken_ = 0;
+        std::vector<Signal> signals_;
+    };
 
     void effects(std::span<const std::size_t> group, EffectSet set, OwnEffects* own, Write write) {
         const bool shows_load = load() && write != Write::subtract;
@@ -194,14 +230,13 @@ private:
         run.history = history.data();
         run.history_mask = ring - 1;
 
-        std::vector<double> velocity(samples_ * width), torque(out_.torque == nullptr ? 0 : samples_ * width);
-        std::vector<double> angle(out_.angle == nullptr ? 0 : samples_ * width);
-        std::vector<double> load_velocity(shows_load ? samples_ * width : 0), load_lag(load_velocity);
-        run.velocity = velocity.data();
-        run.torque = out_.torque == nullptr ? nullptr : torque.data();
-        run.angle = out_.angle == nullptr ? nullptr : angle.data();
-        run.load_velocity = shows_load ? load_velocity.data() : nullptr;
-        run.load_lag = load_lag.data();
+        Spread spread(*this, group, width);
+        run.sink = &spread;
+        run.velocity = spread.signal(out_.velocity, write);
+        run.torque = spread.signal(out_.torque, write);
+        run.angle = spread.signal(out_.angle, write);
+        run.load_velocity = spread.signal(shows_load ? out_.load_velocity : nullptr, Write::set);
+        run.load_lag = spread.signal(shows_load ? out_.load_lag : nullptr, Write::set);
         std::vector<double> asked(own == nullptr ? 0 : 5 * width, no_command);
         if (own != nullptr) {
             std::vector<std::size_t> models(width);
@@ -212,12 +247,8 @@ private:
             own->begin(models, run.own_signals, &asked[4 * width]);
         }
         (alone ? job_.kernel->alone : job_.kernel->run)(run, constants.data());
-        spread(group, velocity, out_.velocity, width, write);
-        spread(group, torque, out_.torque, width, write);
-        spread(group, angle, out_.angle, width, write);
-        if (!shows_load) return;
-        spread(group, load_velocity, out_.load_velocity, width, Write::set);
-        spread(group, load_lag, out_.load_lag, width, Write::set);
+        stop_if_asked(job_.stop);
+        spread.take(run.input.size());
     }
 
     const EffectJob& job_;

@@ -32,7 +32,7 @@ struct EffectJob {
     const EffectKernel* kernel = &best_effects();
     bool lanes = true;                        // false: every model alone; the result is the same
     OwnEffects* own = nullptr;                // of all models, asked by one thread only: with them `workers` does not count
-    const std::atomic<bool>* stop = nullptr;  // once it is set no further models are begun, and Stopped is thrown
+    const std::atomic<bool>* stop = nullptr;  // soon after it is set Stopped is thrown
 };
 
 // `starts`: as EffectModel's linear part takes it in prepare(), one per model or none (rest).

@@ -100,6 +100,8 @@ private:
         const bool open = run_.loop.kind == LoopKind::open;
         const double share = 1.0 / run_.substeps;
         for (std::size_t n = 0; n < run_.input.size(); ++n) {
+            if (run_.ends_at(n)) [[unlikely]]
+                return;
             const double here = run_.position_at(n), next = run_.position_after(n);
             theta_ = run_.position.empty() ? angle_ : R(here);
             time_ = static_cast<double>(n) * run_.sample_time;
@@ -151,6 +153,8 @@ private:
         theta_ = run_.position.empty() ? angle_ : R(run_.position_at(0));
         R y = sensor(), u = control(R(r_before), y);
         for (std::size_t n = 0; n < run_.input.size(); ++n) {
+            if (run_.ends_at(n)) [[unlikely]]
+                return;
             const double r = run_.input[n], here = run_.position_at(n > 0 ? n - 1 : 0), next = run_.position_at(n);
             const int steps = n == 0 && run_.moving ? 0 : run_.substeps;
             for (int j = 0; j < steps; ++j) {
@@ -203,6 +207,7 @@ private:
     }
 
     [[gnu::always_inline]] void write(std::size_t n, R y, R u) {
+        n %= effect_block;
         if (run_.velocity != nullptr) Pack<R>::store(y, run_.velocity + n * width);
         if (run_.torque != nullptr) Pack<R>::store(u, run_.torque + n * width);
         if (run_.angle != nullptr) Pack<R>::store(angle_, run_.angle + n * width);

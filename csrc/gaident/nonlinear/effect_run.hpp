@@ -8,6 +8,17 @@
 
 namespace gaident {
 
+// Samples of the input after which what was written is taken; in 64 substeps each some milliseconds.
+inline constexpr std::size_t effect_block = 1024;
+
+// Takes what a run has written so far, block by block, so that a long run needs little memory and can be ended from outside.
+class EffectSink {
+public:
+    virtual ~EffectSink() = default;
+    // Before the input's sample n, a multiple of effect_block. Returns whether the run goes on.
+    virtual bool take(std::size_t n) = 0;
+};
+
 // What lanes of one run have in common.
 struct EffectRun {
     EffectSet effects;
@@ -25,7 +36,7 @@ struct EffectRun {
     std::span<const double> position;                                  // measured, or empty
     double start_angle = 0.0;
 
-    // Written where not null, lanes side by side: input.size() / log_every * width numbers.
+    // Written where not null, lanes side by side: the last effect_block logged samples, each at its number modulo that.
     double* velocity = nullptr;
     double* torque = nullptr;
     double* angle = nullptr;
@@ -40,6 +51,11 @@ struct EffectRun {
     bool own_at_load = false;            // some of them at the load
     OwnSignals own_signals{};            // width numbers each,
     const double* own_answer = nullptr;  // and answering there
+
+    EffectSink* sink = nullptr;
+
+    // Whether the run ends before the sample n.
+    [[gnu::always_inline]] bool ends_at(std::size_t n) const { return n % effect_block == 0 && !sink->take(n); }
 
     // The measured angle at a sample, and at the one after it [rad]; 0 where none was measured.
     [[gnu::always_inline]] double position_at(std::size_t n) const { return position.empty() ? 0.0 : position[n]; }

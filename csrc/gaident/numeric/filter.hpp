@@ -7,7 +7,10 @@
 //     v(n) = f(n) + z_1,   z_i = z_{i+1} - a_i v(n),
 //
 // a few rows side by side, since each waits for itself; and linear recursions of complex states.
+// Each throws Stopped soon after `stop` is set, where there is one.
 #pragma once
+
+#include "../runtime/stop.hpp"
 
 #include <algorithm>
 #include <array>
@@ -22,7 +25,8 @@ namespace gaident {
 constexpr int max_recursion = 16;  // numbers a_1, a_2, ... of a filter
 
 // The sum over as many samples at a time as stay in registers.
-inline void moving_sum(std::span<const double> b, const double* e, double* v, std::size_t n) {
+inline void moving_sum(std::span<const double> b, const double* e, double* v, std::size_t n,
+                       const std::atomic<bool>* stop = nullptr) {
     constexpr std::size_t block = 16;
     const std::size_t order = b.size() - 1;
     const auto one = [&](std::size_t k) {
@@ -32,7 +36,11 @@ inline void moving_sum(std::span<const double> b, const double* e, double* v, st
     };
     std::size_t k = 0;
     for (; k < std::min(order, n); ++k) one(k);
-    for (; k + block <= n; k += block) {
+    for (std::size_t looked = k; k + block <= n; k += block) {
+        if (k - looked >= samples_between_stops) {
+            stop_if_asked(stop);
+            looked = k;
+        }
         double sum[block];
         for (std::size_t j = 0; j < block; ++j) sum[j] = b[0] * e[k + j];
         for (std::size_t i = 1; i <= order; ++i)
@@ -56,9 +64,10 @@ inline void subtracted(const double* measured, double* rows, std::size_t count, 
 
 // In place; rows `stride` apart.
 template <int order, int rows>
-void recursion(const double* a, double* v, std::size_t stride, std::size_t n) {
+void recursion(const double* a, double* v, std::size_t stride, std::size_t n, const std::atomic<bool>* stop) {
     double z[order + 1][rows] = {};
     for (std::size_t k = 0; k < n; ++k) {
+        if (k % samples_between_stops == 0) stop_if_asked(stop);
         double y[rows];
         for (int r = 0; r < rows; ++r) y[r] = v[static_cast<std::size_t>(r) * stride + k] + z[0][r];
         for (int i = 0; i < order; ++i)
@@ -68,23 +77,23 @@ void recursion(const double* a, double* v, std::size_t stride, std::size_t n) {
 }
 
 template <int order>
-void recursions(const double* a, double* v, std::size_t rows, std::size_t stride, std::size_t n) {
+void recursions(const double* a, double* v, std::size_t rows, std::size_t stride, std::size_t n, const std::atomic<bool>* stop) {
     std::size_t r = 0;
-    for (; r + 4 <= rows; r += 4) recursion<order, 4>(a, v + r * stride, stride, n);
-    for (; r < rows; ++r) recursion<order, 1>(a, v + r * stride, stride, n);
+    for (; r + 4 <= rows; r += 4) recursion<order, 4>(a, v + r * stride, stride, n, stop);
+    for (; r < rows; ++r) recursion<order, 1>(a, v + r * stride, stride, n, stop);
 }
 
 // Rows of e to rows of v, `stride` apart, each row cut into records of these lengths. a has at most 1 + max_recursion numbers.
 inline void filtered(std::span<const double> b, std::span<const double> a, const double* e, double* v, std::size_t rows,
-                     std::size_t stride, std::span<const std::size_t> lengths) {
-    using Run = void (*)(const double*, double*, std::size_t, std::size_t, std::size_t);
+                     std::size_t stride, std::span<const std::size_t> lengths, const std::atomic<bool>* stop = nullptr) {
+    using Run = void (*)(const double*, double*, std::size_t, std::size_t, std::size_t, const std::atomic<bool>*);
     static constexpr auto runs = []<int... order>(std::integer_sequence<int, order...>) {
         return std::array<Run, sizeof...(order)>{recursions<order>...};
     }(std::make_integer_sequence<int, max_recursion + 1>{});
     std::size_t at = 0;
     for (const std::size_t n : lengths) {
-        for (std::size_t r = 0; r < rows; ++r) moving_sum(b, e + r * stride + at, v + r * stride + at, n);
-        if (a.size() > 1) runs[a.size() - 1](a.data(), v + at, rows, stride, n);
+        for (std::size_t r = 0; r < rows; ++r) moving_sum(b, e + r * stride + at, v + r * stride + at, n, stop);
+        if (a.size() > 1) runs[a.size() - 1](a.data(), v + at, rows, stride, n, stop);
         at += n;
     }
 }
@@ -96,11 +105,12 @@ inline void filtered(std::span<const double> b, std::span<const double> a, const
 // b, a: order + 1 numbers of each filter, numbers of the same power of q side by side.
 template <int order, int lanes>
 void powers(const double* b, const double* a, const double* e, const double* weight, std::span<const std::size_t> lengths,
-            double* sums) {
+            double* sums, const std::atomic<bool>* stop) {
     double sum[lanes] = {};
     for (const std::size_t length : lengths) {
         double z[order + 1][lanes] = {};
         for (std::size_t k = 0; k < length; ++k) {
+            if (k % samples_between_stops == 0) stop_if_asked(stop);
             double v[lanes];
             for (int r = 0; r < lanes; ++r) v[r] = b[r] * e[k] + z[0][r];
             for (int i = 0; i < order; ++i)
@@ -116,9 +126,11 @@ void powers(const double* b, const double* a, const double* e, const double* wei
 
 // The same of any number of filters: rows of b and of a, `size` numbers each, at most 1 + max_recursion.
 inline void filtered_powers(const double* b, const double* a, std::size_t filters, std::size_t size, const double* e,
-                            const double* weight, std::span<const std::size_t> lengths, double* sums) {
+                            const double* weight, std::span<const std::size_t> lengths, double* sums,
+                            const std::atomic<bool>* stop = nullptr) {
     constexpr std::size_t lanes = 4;
-    using Run = void (*)(const double*, const double*, const double*, const double*, std::span<const std::size_t>, double*);
+    using Run = void (*)(const double*, const double*, const double*, const double*, std::span<const std::size_t>, double*,
+                         const std::atomic<bool>*);
     static constexpr auto runs = []<int... order>(std::integer_sequence<int, order...>) {
         return std::array<Run, sizeof...(order)>{powers<order, lanes>...};
     }(std::make_integer_sequence<int, max_recursion + 1>{});
@@ -130,14 +142,15 @@ inline void filtered_powers(const double* b, const double* a, std::size_t filter
                 B[i * lanes + r] = b[from];
                 A[i * lanes + r] = a[from];
             }
-        runs[size - 1](B, A, e, weight, lengths, sum);
+        runs[size - 1](B, A, e, weight, lengths, sum, stop);
         std::copy_n(sum, std::min(lanes, filters - first), sums + first);
     }
 }
 
 // products[k] = sum_n e(n) e(n-k), k = 0, 1, ...; in four sums, so that none waits for itself.
-inline void lagged_products(const double* e, std::size_t n, std::span<double> products) {
+inline void lagged_products(const double* e, std::size_t n, std::span<double> products, const std::atomic<bool>* stop = nullptr) {
     for (std::size_t k = 0; k < products.size(); ++k) {
+        stop_if_asked(stop);
         double part[4] = {};
         std::size_t i = std::min(k, n);
         for (; i + 4 <= n; i += 4)
@@ -149,10 +162,11 @@ inline void lagged_products(const double* e, std::size_t n, std::span<double> pr
 
 // x(k+1) = A x(k) + f(k) from x(0): rows f(0..n-1) of m states become x(0..n-1), with `newest` x(1..n). A row-major.
 inline void state_recursion(const std::complex<double>* A, std::span<const std::complex<double>> start, std::complex<double>* f,
-                            std::size_t n, bool newest) {
+                            std::size_t n, bool newest, const std::atomic<bool>* stop = nullptr) {
     const std::size_t m = start.size();
     std::vector<std::complex<double>> now(start.begin(), start.end()), next(m);
     for (std::size_t k = 0; k < n; ++k, f += m) {
+        if (k % samples_between_stops == 0) stop_if_asked(stop);
         for (std::size_t i = 0; i < m; ++i) {
             double re = f[i].real(), im = f[i].imag();  // the library's product looks for infinities
             for (std::size_t j = 0; j < m; ++j) {

@@ -156,7 +156,7 @@ SearchRanges ranges_around(const Factors<double>& g) {
 
 template <class A>
 bool velocity_in(bool in_z, const Factors<double>& g, std::span<const double> input, double Ts, const Loop& loop,
-                 std::span<double> velocity) {
+                 std::span<double> velocity, const std::atomic<bool>* stop) {
     using Number = typename A::Number;
     double peak = 0.0;
     for (const double v : input) peak = std::max(peak, std::abs(v));
@@ -165,6 +165,7 @@ bool velocity_in(bool in_z, const Factors<double>& g, std::span<const double> in
     const double limit = static_cast<double>(A::worst());
     bool left = false;
     const auto keep = [&](std::size_t k, const typename A::Signal& y) {
+        if (k % samples_between_stops == 0) stop_if_asked(stop);
         left = left || left_range(y, limit);
         velocity[k] = left ? std::numeric_limits<double>::quiet_NaN() : static_cast<double>(y);
     };
@@ -194,7 +195,8 @@ std::unique_ptr<Mirror> mirror_of(const Experiment& e, const Genome& g, const Fi
 struct Row {
     std::string_view name;
     std::unique_ptr<Mirror> (*make)(const Experiment&, const Genome&, const FitnessWeights&);
-    bool (*velocity)(bool, const Factors<double>&, std::span<const double>, double, const Loop&, std::span<double>);
+    bool (*velocity)(bool, const Factors<double>&, std::span<const double>, double, const Loop&, std::span<double>,
+                     const std::atomic<bool>*);
 };
 
 template <class A>
@@ -233,9 +235,9 @@ std::vector<std::string_view> mirror_names() {
 }
 
 bool mirror_velocity(std::string_view arithmetic, bool in_z, const Factors<double>& g, std::span<const double> input,
-                     double sample_time, const Loop& loop, std::span<double> velocity) {
+                     double sample_time, const Loop& loop, std::span<double> velocity, const std::atomic<bool>* stop) {
     const FlushDenormals flush;
-    return row_named(arithmetic, loop).velocity(in_z, g, input, sample_time, loop, velocity);
+    return row_named(arithmetic, loop).velocity(in_z, g, input, sample_time, loop, velocity, stop);
 }
 
 }  // namespace gaident

@@ -36,7 +36,8 @@ std::vector<std::string_view> mirror_names();
 // One model's velocity in such an arithmetic; `in_z`: not in delta form but in powers of z, the coefficients computed in double
 // and rounded once, which is more exact than in a drive.
 // Returns whether it left the arithmetic's range; from there on the velocity is NaN.
+// Throws Stopped soon after `stop` is set, where there is one.
 bool mirror_velocity(std::string_view arithmetic, bool in_z, const Factors<double>& g, std::span<const double> input,
-                     double sample_time, const Loop& loop, std::span<double> velocity);
+                     double sample_time, const Loop& loop, std::span<double> velocity, const std::atomic<bool>* stop = nullptr);
 
 }  // namespace gaident

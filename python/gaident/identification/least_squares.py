@@ -40,6 +40,9 @@ __all__ = ["LeastSquares", "least_squares"]
 
 Vector = NDArray[np.float64]
 CONVERGED = 1e-9  # no decision: of a solver
+# What is done at once, so that Ctrl-C comes through: rows times the square of the unknowns, and samples.
+BLOCK = 1 << 23  # no decision: some 0.1 s; records of one block have the bits of a whole regression
+FILTERED = 1 << 20  # no decision: the same bits in blocks of any size
 
 
 @dataclass(frozen=True, eq=False)
@@ -189,49 +192,73 @@ def least_squares(
     )
 
 
-def regressors(source: Vector, velocity: Vector, N: int) -> Vector:
-    """phi(n)' = (r(n)..r(n-N), w(n-1)..w(n-N)) as rows, n = N..S-1: shape (S - N, 2N + 1)."""
-    rows = len(source) - N
-    columns = [source[N - i : N - i + rows] for i in range(N + 1)]
-    columns += [velocity[N - i : N - i + rows] for i in range(1, N + 1)]
+def regressors(source: Vector, velocity: Vector, N: int, rows: slice | None = None) -> Vector:
+    """phi(n)' = (r(n)..r(n-N), w(n-1)..w(n-N)) as rows, n = N..S-1: shape (S - N, 2N + 1), or of these the ones asked for."""
+    start, stop, _ = (rows or slice(None)).indices(len(source) - N)
+    columns = [source[N - i + start : N - i + stop] for i in range(N + 1)]
+    columns += [velocity[N - i + start : N - i + stop] for i in range(1, N + 1)]
     return np.column_stack(columns)
+
+
+def _parts(rows: int, unknowns: int) -> list[slice]:
+    """The rows of a regression, block by block."""
+    size = max(BLOCK // unknowns**2, 8 * unknowns)
+    return [slice(start, min(start + size, rows)) for start in range(0, rows, size)]
 
 
 def _iterate(source: Vector, y: Vector, N: int, instruments: bool, whitening: bool) -> tuple[Vector, Vector, float, int, bool]:
     """(theta, covariance, deviation of v, rounds, converged)."""
-    phi = regressors(source, y, N)
-    theta, covariance, noise_std = _solve(phi, phi, y[N:])
+    theta, covariance, noise_std = _solve(source, y, y, N)
     if not (instruments or whitening):
         return theta, covariance, noise_std, 1, True
     for rounds in range(2, POLICY.regressions + 1):
         before, polynomial = theta, _stabilised(theta[N + 1 :])
         one = np.ones(1)
         r, w = (_from_rest(one, polynomial, x) for x in (source, y)) if whitening else (source, y)
-        phi = z = regressors(r, w, N)
-        if instruments:
-            z = regressors(r, _from_rest(before[: N + 1], polynomial, r), N)
-        theta, covariance, noise_std = _solve(phi, z, w[N:])
+        answer = _from_rest(before[: N + 1], polynomial, r) if instruments else w
+        theta, covariance, noise_std = _solve(r, w, answer, N)
         if np.linalg.norm(theta - before) <= CONVERGED * np.linalg.norm(theta):
             return theta, covariance, noise_std, rounds, True
     return theta, covariance, noise_std, POLICY.regressions, False
 
 
-def _solve(phi: Vector, z: Vector, y: Vector) -> tuple[Vector, Vector, float]:
-    """theta with z'(y - phi theta) = 0, its covariance s^2 (Q'phi)^-1 (Q'phi)^-T with Q R = z, and s."""
-    size: Vector = np.sqrt(np.einsum("ij,ij->j", phi, phi))
+def _solve(r: Vector, w: Vector, instrument: Vector, N: int) -> tuple[Vector, Vector, float]:
+    """theta with z'(y - phi theta) = 0, its covariance s^2 (Q'phi)^-1 (Q'phi)^-T with Q R = z, and s.
+
+    phi: the regressors of r and w, y: w, z: the regressors of r and the instrument.
+    Block by block: of [R; z of the next rows] the new Q and R, and Q' times what was found so far and comes next.
+    """
+    parts, y = _parts(len(r) - N, 2 * N + 1), w[N:]
+    power = np.zeros(2 * N + 1)
+    for part in parts:
+        phi = regressors(r, w, N, part)
+        power += np.einsum("ij,ij->j", phi, phi)
+    size: Vector = np.sqrt(power)
     size[size == 0.0] = 1.0
-    Q, _ = np.linalg.qr(z)
-    inverse = np.linalg.pinv(Q.T @ (phi / size), rcond=1e-13) / size[:, None]
-    theta = inverse @ (Q.T @ y)
-    error = y - phi @ theta
-    variance = float(error @ error) / (len(y) - len(theta))
+    R, seen, answer = np.zeros((0, 2 * N + 1)), np.zeros((0, 2 * N + 1)), np.zeros(0)
+    for part in parts:
+        phi = regressors(r, w, N, part)
+        z = phi if instrument is w else regressors(r, instrument, N, part)
+        Q, R = np.linalg.qr(np.vstack([R, z]))
+        seen, answer = Q.T @ np.vstack([seen, phi / size]), Q.T @ np.concatenate([answer, y[part]])
+    inverse = np.linalg.pinv(seen, rcond=1e-13) / size[:, None]
+    theta = inverse @ answer
+    squares = 0.0
+    for part in parts:
+        error = y[part] - regressors(r, w, N, part) @ theta
+        squares += float(error @ error)
+    variance = squares / (len(y) - len(theta))
     return theta, variance * inverse @ inverse.T, variance**0.5
 
 
 def _from_rest(alpha: Vector, polynomial: Vector, source: Vector) -> Vector:
     from scipy.signal import lfilter
 
-    answer: Vector = lfilter(alpha, polynomial, source)
+    answer: Vector = np.empty(len(source))
+    state = np.zeros(max(len(alpha), len(polynomial)) - 1)
+    for start in range(0, len(source), FILTERED):
+        part = slice(start, start + FILTERED)
+        answer[part], state = lfilter(alpha, polynomial, source[part], zi=state)
     return answer
 
 

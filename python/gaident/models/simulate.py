@@ -26,6 +26,7 @@ from gaident.models.simulation_input import (
     states_of,
 )
 
+BLOCK = 1 << 18  # no decision: rows of a regression, some 0.1 s
 ARITHMETICS = ("double", "float", "drive_double", "drive_float", "c30", "fixed", "fixed_tight", "fixed_wide")
 
 
@@ -236,15 +237,29 @@ def initial_state(model: AnyModel, rec: Record, controller: Controller | None = 
         return np.zeros(0)
     silence = np.zeros_like(source)
     missing = rec.velocity - _core_simulate(plant, rec.dt, source, controller, np.zeros(size), "double")[0]
-    columns = np.column_stack([_core_simulate(plant, rec.dt, silence, controller, unit, "double")[0] for unit in np.eye(size)])
-    if not (np.all(np.isfinite(columns)) and np.all(np.isfinite(missing))):
+    answers = [_core_simulate(plant, rec.dt, silence, controller, unit, "double")[0] for unit in np.eye(size)]
+    if not all(np.all(np.isfinite(answer)) for answer in (*answers, missing)):
         raise ModelError(
             f"{plant!r} diverges within the record: its initial state cannot be found; use a "
             "shorter part of the record or a stable model"
         )
-    lengths = np.linalg.norm(columns, axis=0)
+    return _least_norm(answers, missing)
+
+
+def _least_norm(answers: list[Signal], wanted: Signal) -> Signal:
+    """x with the smallest sum of x_i answers_i - wanted, and of these the smallest; long ones block by block, so for Ctrl-C."""
+    if len(wanted) <= BLOCK:
+        columns = np.column_stack(answers)
+        lengths = np.linalg.norm(columns, axis=0)
+    else:
+        lengths = np.array([np.linalg.norm(answer) for answer in answers])
+        both = np.zeros((0, len(answers) + 1))
+        for start in range(0, len(wanted), BLOCK):
+            rows = np.column_stack([signal[start : start + BLOCK] for signal in (*answers, wanted)])
+            both = np.linalg.qr(np.vstack([both, rows]), mode="r")
+        columns, wanted = both[:, :-1], both[:, -1]
     lengths[lengths == 0.0] = 1.0
-    solution = np.linalg.lstsq(columns / lengths, missing, rcond=1e-12)[0]
+    solution = np.linalg.lstsq(columns / lengths, wanted, rcond=1e-12)[0]
     state: Signal = solution / lengths
     return state
 
