@@ -256,7 +256,7 @@ def _least_norm(answers: list[Signal], wanted: Signal) -> Signal:
         both = np.zeros((0, len(answers) + 1))
         for start in range(0, len(wanted), BLOCK):
             rows = np.column_stack([signal[start : start + BLOCK] for signal in (*answers, wanted)])
-            both = np.linalg.qr(np.vstack([both, rows]), mode="r")
+            both = np.asarray(np.linalg.qr(np.vstack([both, rows]), mode="r"))
         columns, wanted = both[:, :-1], both[:, -1]
     lengths[lengths == 0.0] = 1.0
     solution = np.linalg.lstsq(columns / lengths, wanted, rcond=1e-12)[0]

@@ -15,9 +15,10 @@ import numpy as np
 import pytest
 
 import gaident as ga
-from gaident.data.formats import table
+from gaident.data.formats import delimited, table
 from gaident.errors import ReadError
 
+FUZZ = Path(__file__).resolve().parents[2] / "fuzz"
 ROWS = "".join(f"{k * 1e-3:.3f},{k % 7},{k % 5}\n" for k in range(40))
 HEAD = "t,torque,velocity"
 
@@ -127,6 +128,66 @@ def test_a_file_that_unpacks_to_gigabytes_is_refused(make: Callable[[Path], None
     said, kilobytes = done.stdout.splitlines()
     assert "20 times the file" in said, done.stderr
     assert int(kilobytes) < 1 << 20
+
+
+def test_a_trace_that_holds_its_values_for_long_is_refused(tmp_path: Path) -> None:
+    """1 kB stood for 20 million samples of each of its signals."""
+    path = tmp_path / "trace.xml"
+    signals = "".join(f'<dataSignal interval="0.001" id="f{k}" name="s{k}" datapointCount="15000000"/>' for k in range(3))
+    records = "".join(f'<rec time="{k}" f0="1" f1="2" f2="3"/>' for k in range(3))
+    trace = f"<traceSession><traceData><dataFrame>{signals}{records}</dataFrame></traceData></traceSession>"
+    path.write_text(trace)
+    with pytest.raises(ReadError, match=r"trace\.xml: its [0-9]+ bytes unpack to 720000000 or more, .*; save the log without"):
+        ga.read_columns(path)
+    path.write_text(trace.replace("15000000", "1e300"))
+    with pytest.raises(ReadError, match=r"unpack to .* or more"):
+        ga.read_columns(path)
+    path.write_text(trace.replace('"0.001"', '"1e-300"'))
+    with pytest.raises(ReadError, match=r"unpack to .* or more"):
+        ga.read_columns(path)
+    path.write_text(trace.replace("15000000", "3000"))
+    values = ga.read_columns(path)["s1"]
+    assert len(values) == 3000 and np.all(values == 2.0)
+
+
+def of_every_format() -> list[Any]:
+    """A whole log of each, as `make fuzz` has them."""
+    sys.path.insert(0, str(FUZZ))
+    from corpus import seeds
+
+    first: dict[str, Any] = {}
+    for seed in seeds():
+        if seed.form not in ("saved", "response", "drive"):
+            first.setdefault(seed.form, seed)
+    return [pytest.param(seed.ending, seed.content, id=form) for form, seed in first.items()]
+
+
+@pytest.mark.parametrize(("ending", "content"), of_every_format())
+def test_one_limit_of_samples_for_every_format(
+    ending: str, content: bytes, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = tmp_path / f"log{ending}"
+    path.write_bytes(content)
+    assert max(map(len, ga.read_columns(path).values())) > 10
+    monkeypatch.setattr(table, "MOST_SAMPLES", 10)
+    with pytest.raises(ReadError, match=r"log\.\w+: the signal '.*' has \d+ samples or more, and at most 10 are read; save the"):
+        ga.read_columns(path)
+
+
+def test_the_limit_of_samples_holds_for_long_text_and_frames(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    pandas: Any = pytest.importorskip("pandas")
+    assert table.MOST_SAMPLES == 1_000_000_000 and "1 000 000 000 samples" in (FUZZ.parents[1] / "SECURITY.md").read_text()
+    path = tmp_path / "log.csv"
+    path.write_text(f"{HEAD}\n{ROWS}")
+    monkeypatch.setattr(table, "MOST_SAMPLES", 30)
+    monkeypatch.setattr(delimited, "WHOLE", 0)
+    monkeypatch.setattr(delimited, "ROWS", 16)
+    for function in (ga.read, ga.read_pieces, ga.read_columns):
+        for source in (path, pandas.read_csv(path)):
+            if function is ga.read_columns and source is not path:
+                continue
+            with pytest.raises(ReadError, match=r"has [0-9]+ samples or more, and at most 30 are read; save the log in parts"):
+                function(source)
 
 
 def test_data_in_another_file_are_never_read(tmp_path: Path) -> None:

@@ -27,6 +27,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gaident.data.formats.delimited import TextOptions
+from gaident.data.formats.stored import check_unpacked
 from gaident.data.formats.table import Column, LogTable, first_line
 from gaident.errors import ReadError
 
@@ -34,7 +35,7 @@ __all__ = ["open_sinumerik"]
 
 _UNITS = {"current": "A"}
 _ROOT = "traceSession"
-_LONGEST = 20_000_000  # no decision: memory; samples of a signal
+FARTHEST = 2.0**53  # no decision: a number: the last of the whole numbers that a float counts
 
 
 class _Signal:
@@ -52,18 +53,17 @@ class _Signal:
         self.times: list[float] = []
         self.values: list[float] = []
 
-    def samples(self, path: str) -> tuple[float, NDArray[np.float64]]:
-        """(time of the first sample [s], all samples, the last value held where nothing was written)."""
-        start = self.times[0]
-        at = np.rint((np.array(self.times) - start) / self.interval).astype(np.int64)
-        count = max(int(at[-1]) + 1, self.count)
-        if count > _LONGEST:
-            raise ReadError(f"{path}: the signal {self.name!r} has {count} samples, more than {_LONGEST}; record a shorter trace")
+    def places(self, path: str) -> NDArray[np.float64]:
+        """The samples at which it was written, whole numbers from 0 on, and the one behind its last."""
+        with np.errstate(over="ignore"):
+            at = np.minimum(np.rint((np.array(self.times) - self.times[0]) / self.interval), FARTHEST)
         if (np.diff(at) < 0).any():
             raise ReadError(f"{path}: the times of its records do not increase; record the trace again")
-        samples = np.zeros(count, dtype=np.int64)
-        samples[at] = np.arange(at.size)
-        return start, np.array(self.values)[np.maximum.accumulate(samples)]
+        return np.append(at, max(float(at[-1]) + 1.0, float(self.count)))
+
+    def samples(self, places: NDArray[np.float64]) -> tuple[float, NDArray[np.float64]]:
+        """(time of the first sample [s], all samples, the last value held where nothing was written)."""
+        return self.times[0], np.repeat(self.values, np.diff(places).astype(np.int64))
 
 
 def open_sinumerik(path: str, file: Path, options: TextOptions, stack: ExitStack) -> LogTable:
@@ -71,7 +71,7 @@ def open_sinumerik(path: str, file: Path, options: TextOptions, stack: ExitStack
 
     Raises ReadError for another XML file, several recordings in one file, and one that has lost points.
     """
-    trace = _Trace(path)
+    trace = _Trace(path, file.stat().st_size)
     try:
         for event, element in ElementTree.iterparse(file, events=("start", "end")):
             trace.pass_by(event, element)
@@ -85,8 +85,8 @@ def open_sinumerik(path: str, file: Path, options: TextOptions, stack: ExitStack
 class _Trace:
     """What a file contains, as its elements pass."""
 
-    def __init__(self, path: str) -> None:
-        self.path, self.root, self.frames = path, "", 0
+    def __init__(self, path: str, size: int) -> None:
+        self.path, self.size, self.root, self.frames = path, size, "", 0
         self.signals: dict[str, _Signal] = {}
 
     def pass_by(self, event: str, element: ElementTree.Element) -> None:
@@ -120,8 +120,11 @@ class _Trace:
             raise ReadError(f"{self.path}: the trace contains no records; record it again")
         clocks: dict[tuple[float, float, int], str] = {}
         columns = []
-        for signal in written:
-            start, values = signal.samples(self.path)
+        places = [signal.places(self.path) for signal in written]
+        # A value that is held for long is a few letters: what they stand for is counted before it is made.
+        check_unpacked(self.path, int(2 * 8 * sum(float(at[-1]) for at in places)), self.size)
+        for signal, at in zip(written, places, strict=True):
+            start, values = signal.samples(at)
             rate = start, signal.interval, values.size
             clock = clocks.setdefault(rate, f"time of {signal.interval:g} s from {start:g} s" if clocks else "time")
             names = tuple(dict.fromkeys(name for name in (signal.description, signal.key) if name and name != signal.name))

@@ -24,6 +24,7 @@ _NUMBER_SIGN = re.compile(r"#\s*(\d+)")
 _PICK = re.compile(r"(.+)\[\s*(:|-?\d+)\s*,\s*(:|-?\d+)\s*\]")
 _LISTED = 40  # no decision: how many columns a message names
 MOST_COLUMNS = 100_000  # no decision: what an argument may be: columns of a log
+MOST_SAMPLES = 1_000_000_000  # no decision: what an argument may be: samples of a signal, 11 days at 1 kHz
 LONGEST_NAME = 10_000  # no decision: what an argument may be: characters of a column's name
 SHOWN_NAME = 20  # no decision: printed: letters of a name that is too long
 
@@ -122,13 +123,14 @@ class LogTable:
     remark: str = ""
 
     def checked(self) -> LogTable:
-        """The table, where it has no more columns, and none of a longer name, than a log has; raises ReadError."""
+        """The table, where it has no more columns, and none with more samples or a longer name, than a log; raises ReadError."""
         if len(self.columns) > MOST_COLUMNS:
             raise ReadError(
                 f"{self.path}: {len(self.columns)} columns, and at most {MOST_COLUMNS} are read; save those that belong to the "
                 "drive"
             )
         for k, column in enumerate(self.columns):
+            self._check_length(len(column.values), column.key)
             if len(column.key) > LONGEST_NAME:
                 raise ReadError(
                     f"{self.path}: the name of column #{k} is {len(column.key)} characters long "
@@ -136,6 +138,13 @@ class LogTable:
                     "a quotation mark may lack its end, or the rows may stand in one line"
                 )
         return self
+
+    def _check_length(self, samples: int, name: str) -> None:
+        if samples > MOST_SAMPLES:
+            raise ReadError(
+                f"{self.path}: the signal {name!r} has {samples} samples or more, and at most {MOST_SAMPLES} are read; save the "
+                "log in parts"
+            )
 
     def place(self, row: int) -> str:
         """Where a row stands, for messages."""
@@ -147,7 +156,11 @@ class LogTable:
         What is in memory anyway comes as one block. Columns that are still in the file must be of one length.
         """
         if self.batches is not None:
-            yield from self.batches(columns)
+            rows = 0
+            for block in self.batches(columns):
+                rows += max((len(column.values) for column in block.columns), default=0)
+                self._check_length(rows, columns[0].key if columns else "")
+                yield block
         elif any(isinstance(column.values, Stored) for column in columns):
             for start in range(0, max(len(column.values) for column in columns), rows):
                 part = tuple(replace(column, values=column.values[start : start + rows]) for column in columns)
