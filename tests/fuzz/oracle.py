@@ -3,19 +3,20 @@
     python tests/fuzz/oracle.py --cases 100000        the long form
     python tests/fuzz/oracle.py --only 4711           one case: the file, what must come of it, what came of it
 
-The exit code is 1 where a case is read wrongly, is read and must not be, or is refused and must be read.
+The exit code is 1 where a case is read wrongly, is read and must not be, or is refused and must be read, and where none was tried.
 """
 
 from __future__ import annotations
 
 import argparse
+import math
 import os
 import sys
 import tempfile
+import time
 import warnings
 from collections import Counter
 from concurrent.futures import ProcessPoolExecutor
-from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -82,6 +83,7 @@ def only(seed: int, number: int) -> int:
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--cases", type=int, default=5000, help="how many (%(default)s)")
+    parser.add_argument("--minutes", type=float, default=math.inf, help="how long at most (no limit)")
     parser.add_argument("--seed", type=int, default=1, help="another seed makes other cases (%(default)s)")
     parser.add_argument("--workers", type=int, default=os.cpu_count() or 1, help="processes (%(default)s)")
     parser.add_argument("--only", type=int, metavar="NUMBER", help="one case, with its file")
@@ -93,9 +95,13 @@ def main() -> int:
     stops = [min(start + PART, given.cases) for start in starts]
     counts: Counter[tuple[str, str]] = Counter()
     flawed: list[int] = []
+    until = time.monotonic() + 60.0 * given.minutes
     with ProcessPoolExecutor(given.workers) as pool:
-        for found in pool.map(partial(part, given.seed), starts, stops):
-            for number, fault, became, wrong in found:
+        parts = [pool.submit(part, given.seed, start, stop) for start, stop in zip(starts, stops, strict=True)]
+        for taken in parts:
+            if time.monotonic() > until and taken.cancel():
+                continue
+            for number, fault, became, wrong in taken.result():
                 counts[fault, became] += 1
                 if wrong:
                     flawed.append(number)
@@ -108,8 +114,8 @@ def main() -> int:
             *(f"{counts[fault, became]:8}" for became in ("read", "refused", "noted")),
             f"{counts[fault, 'unknown']:16}",
         )
-    print(f"{given.cases} cases of seed {given.seed}: {len(flawed)} wrong")
-    return 1 if flawed else 0
+    print(f"{counts.total()} cases of seed {given.seed}: {len(flawed)} wrong")
+    return 1 if flawed or not counts else 0
 
 
 if __name__ == "__main__":

@@ -7,7 +7,7 @@
 An input is one file of the corpus with a few damages, the same for the same seed and number, and the same libraries.
 What must hold: every call ends with a result, or with a GaidentError or an OSError of one line; no warning comes through;
 it takes at most 5 s of processor time, 10 s where a library's process starts, and less than 1 GiB of memory.
-The exit code is 1 where anything does not hold, and the files that show it lie in build/fuzz.
+The exit code is 1 where anything does not hold, and the files that show it lie in build/fuzz; and where no input was tried.
 """
 
 from __future__ import annotations
@@ -278,7 +278,7 @@ def main() -> int:
         print(f"{form:10} {done[form]:8} {taken[form]:8} {done[form] - taken[form]:8} {slowest[form]:12.2f}")
     took = f"{sum(done.values())} inputs of seed {given.seed} in {(time.monotonic() - began) / 60.0:.1f} min"
     print(f"{took}, at most {memory:.0f} MiB: {len(flawed)} flawed{f' (they lie in {FLAWS})' if flawed else ''}")
-    return 1 if flawed else 0
+    return 1 if flawed or not done else 0
 
 
 if __name__ == "__main__":

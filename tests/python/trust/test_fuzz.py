@@ -199,3 +199,24 @@ def test_seconds_since_1970_have_the_sample_time_of_few_digits(tmp_path: Path) -
     path = tmp_path / "log.csv"
     path.write_text("time,torque,velocity\n" + "".join(f"{1772359872 + k * 1e-3:.4f},{k},{k}\n" for k in range(75)))
     assert ga.read(path).dt == 1e-3
+
+
+@pytest.mark.long
+def test_the_tables_end_when_their_time_is_over() -> None:
+    done = ran("oracle.py", "--cases", "1000000", "--minutes", "0.02", "--workers", "1")
+    said = done.stdout.splitlines()[-1]
+    assert done.returncode == 0 and said.endswith("cases of seed 1: 0 wrong"), done.stdout + done.stderr
+    assert 200 <= int(said.split()[0]) < 100_000
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("script", ["run.py", "oracle.py"])
+def test_nothing_tried_is_no_success(script: str) -> None:
+    assert ran(script, "--cases" if script == "oracle.py" else "--inputs", "0", "--workers", "1").returncode == 1
+
+
+def test_ci_runs_them() -> None:
+    ci = ROOT / ".ci" / "run"
+    if not ci.exists():
+        pytest.skip("no CI here")
+    assert "set -e" in ci.read_text() and "\nmake fuzz " in ci.read_text()
