@@ -3,7 +3,8 @@
     python tests/fuzz/oracle.py --cases 100000        the long form
     python tests/fuzz/oracle.py --only 4711           one case: the file, what must come of it, what came of it
 
-The exit code is 1 where a case is read wrongly, is read and must not be, or is refused and must be read, and where none was tried.
+The exit code is 1 where a case is read wrongly, is read and must not be, or is refused and must be read; and where none was
+tried.
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ import time
 import warnings
 from collections import Counter
 from concurrent.futures import ProcessPoolExecutor
+from itertools import chain, repeat
 from pathlib import Path
 
 import numpy as np
@@ -97,11 +99,12 @@ def main() -> int:
     flawed: list[int] = []
     until = time.monotonic() + 60.0 * given.minutes
     with ProcessPoolExecutor(given.workers) as pool:
-        parts = [pool.submit(part, given.seed, start, stop) for start, stop in zip(starts, stops, strict=True)]
-        for taken in parts:
-            if time.monotonic() > until and taken.cancel():
-                continue
-            for number, fault, became, wrong in taken.result():
+        for first in range(0, len(starts), 4 * given.workers):
+            if time.monotonic() > until:
+                break
+            taken = slice(first, first + 4 * given.workers)
+            answers = pool.map(part, repeat(given.seed), starts[taken], stops[taken])
+            for number, fault, became, wrong in chain.from_iterable(answers):
                 counts[fault, became] += 1
                 if wrong:
                     flawed.append(number)
