@@ -17,6 +17,15 @@ import pytest
 import gaident as ga
 from gaident.files import write_whole
 
+SOME_TIMES = """
+import sys
+from gaident.files import write_whole
+done = 0
+for _ in range(25):
+    write_whole(sys.argv[1], sys.argv[2].encode() * 200_000)
+    done += 1
+print(done)
+"""
 FOR_EVER = """
 import sys
 from gaident.files import write_whole
@@ -104,6 +113,30 @@ def test_threads_with_one_target_tear_and_lose_nothing(tmp_path: Path) -> None:
         thread.join()
     assert not failed
     assert [p.name for p in tmp_path.iterdir()] == ["t.json"]
+
+
+def test_processes_with_one_target_tear_and_lose_nothing(tmp_path: Path) -> None:
+    """Each says how often it wrote; one is killed amid its work, and its rest is removed by the next write."""
+    target = tmp_path / "t.json"
+    write_whole(target, b"Z" * 200_000)
+    letters = ("a", "b", "c", "d")
+    writers = [
+        subprocess.Popen([sys.executable, "-c", SOME_TIMES, str(target), letter], stdout=subprocess.PIPE, text=True)
+        for letter in letters
+    ]
+    seen: set[bytes] = set()
+    with subprocess.Popen([sys.executable, "-c", FOR_EVER, str(target)]) as killed:
+        while any(writer.poll() is None for writer in writers):
+            content = target.read_bytes()
+            assert len(set(content)) == 1 and len(content) in (200_000, 300_000)
+            seen.add(content[:1])
+        killed.send_signal(signal.SIGKILL)
+    assert [writer.communicate()[0].split() for writer in writers] == [["25"]] * len(writers)
+    assert {letter.encode() for letter in letters} & seen
+    content = target.read_bytes()
+    assert len(set(content)) == 1 and len(content) in (200_000, 300_000)
+    write_whole(target, b"end")
+    assert [p.name for p in tmp_path.iterdir()] == ["t.json"] and target.read_bytes() == b"end"
 
 
 def test_a_killed_write_leaves_a_whole_file_and_its_rest_is_removed_by_the_next(tmp_path: Path) -> None:
