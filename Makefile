@@ -35,7 +35,7 @@ SOURCES := pyproject.toml CMakeLists.txt LICENSE README.md \
 ifndef SIDE_BY_SIDE
 .NOTPARALLEL:
 endif
-.PHONY: help install demo test fuzz bench real bare oldest embedded wasm try wheel windows arm64 tidy docs lint test-cpp test-python test-long clean build-checked test-checked test-sanitized
+.PHONY: help install demo test fuzz bench real bare oldest embedded wasm try wheel windows arm64 tidy docs lint test-cpp test-python test-long clean build-checked test-checked test-sanitized test-threads
 .DEFAULT_GOAL := help
 
 help: ## list the commands
@@ -70,6 +70,15 @@ test-sanitized: .venv/.tools ## the C++ tests again under AddressSanitizer and U
 	$(CMAKE) -B build/sanitized -DGAIDENT_SANITIZE=ON -DGAIDENT_BENCH=OFF > build/sanitized/configure.log || { cat build/sanitized/configure.log; exit 1; }
 	$(BIN)/cmake --build build/sanitized --target all all_verify_interface_header_sets
 	$(CTEST) build/sanitized
+
+# What runs on several threads; ctest takes one at a time, for the sanitizer takes five times the memory.
+THREADED := test_parallel test_engine test_batch test_denormals test_counting
+test-threads: .venv/.tools ## the C++ tests that use several threads, under ThreadSanitizer (docs/trust.md)
+	@mkdir -p build/threads
+	$(CMAKE) -B build/threads -DGAIDENT_SANITIZE=thread -DGAIDENT_BENCH=OFF > build/threads/configure.log || { cat build/threads/configure.log; exit 1; }
+	$(BIN)/cmake --build build/threads --target $(THREADED)
+	TSAN_OPTIONS=halt_on_error=1:second_deadlock_stack=1 $(BIN)/ctest --output-on-failure --no-tests=error --test-dir build/threads \
+		-R '^($(subst $(eval ) ,|,$(strip $(THREADED))))$$'
 
 PYTEST := $(BIN)/python -m pytest -n $(JOBS) --dist worksteal
 
