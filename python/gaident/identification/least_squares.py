@@ -41,8 +41,8 @@ __all__ = ["LeastSquares", "least_squares"]
 Vector = NDArray[np.float64]
 CONVERGED = 1e-9  # no decision: of a solver
 # What is done at once, so that Ctrl-C comes through: rows times the square of the unknowns, and samples.
-BLOCK = 1 << 23  # no decision: some 0.1 s; records of one block have the bits of a whole regression
-FILTERED = 1 << 20  # no decision: the same bits in blocks of any size
+BLOCK = 1 << 23  # no decision: memory; some 0.1 s; records of one block have the bits of a whole regression
+FILTERED = 1 << 20  # no decision: memory; the same bits in blocks of any size
 
 
 @dataclass(frozen=True, eq=False)
@@ -202,7 +202,7 @@ def regressors(source: Vector, velocity: Vector, N: int, rows: slice | None = No
 
 def _parts(rows: int, unknowns: int) -> list[slice]:
     """The rows of a regression, block by block."""
-    size = max(BLOCK // unknowns**2, 8 * unknowns)
+    size = max(BLOCK // unknowns**2, 8 * unknowns)  # no decision: memory
     return [slice(start, min(start + size, rows)) for start in range(0, rows, size)]
 
 

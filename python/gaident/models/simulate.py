@@ -26,7 +26,7 @@ from gaident.models.simulation_input import (
     states_of,
 )
 
-BLOCK = 1 << 18  # no decision: rows of a regression, some 0.1 s
+BLOCK = 1 << 18  # no decision: memory; rows of a regression, some 0.1 s
 ARITHMETICS = ("double", "float", "drive_double", "drive_float", "c30", "fixed", "fixed_tight", "fixed_wide")
 
 
