@@ -1,5 +1,5 @@
-#include "../gaident/numeric/filter.hpp"
-#include "../gaident/numeric/zero_phase.hpp"
+#include "../gaident/estimation/filter.hpp"
+#include "../gaident/estimation/zero_phase.hpp"
 #include "../gaident/control/replay.hpp"
 #include "bindings.hpp"
 
