@@ -263,9 +263,9 @@ def diagnose(
                 if looped.found.driver is None:
                     work, found, discarded = looped
                     discarded.append(LOOP_MAKES)
-            if found.driver is not None and any(map(len, work.hit)):
+            if found.driver is not None and work.left_out:
                 note(0.03, "once more, with the lines that looked like outliers")
-                whole = under_best_controller(replace(driving, every_line=True), most, linear)
+                whole = under_best_controller(replace(driving, every_line=True), most, linear or identified(driving))
                 if whole.found.driver is None:
                     work, found, discarded = whole
             if found.causes or found.driver is None:

@@ -26,6 +26,7 @@ from gaident.diagnosis.explain.determined import determined, not_determined
 from gaident.diagnosis.explain.ends import ends_of
 from gaident.diagnosis.explain.held_out import standing
 from gaident.diagnosis.explain.late_inside import late_inside
+from gaident.diagnosis.explain.late_sensor import by_the_angle, excluded_by_the_angle
 from gaident.diagnosis.explain.not_there import bounds_of
 from gaident.diagnosis.explain.verdict import verdict_of
 from gaident.diagnosis.explain.wording import (
@@ -104,7 +105,8 @@ class Work:
         self.clean = clean = tuple(cleaned(r, h) for r, h in zip(self.records, others, strict=True))
         self.step = quantisation(self.records)
         read = as_read(whole := self.driving.read, list(map(cleaned, whole, others)), self.controller)
-        data = DataSet.of(clean, self.controller, any(len(h) for h in others), read, self.step, self.axis, self.pitch)
+        self.left_out = any(map(len, others))
+        data = DataSet.of(clean, self.controller, self.left_out, read, self.step, self.axis, self.pitch)
         data = replace(data.with_its_period(), clocked=self.driving.clocked)
         self.notes += period_seen(data)
         self.scales = scales_of(data)
@@ -132,12 +134,12 @@ class Work:
     def search(self) -> None:
         """The selected model, its rivals, what is left."""
         allowed, self.not_testable = candidates(self.records, self.clean, self.data, self.excited, self.at_controller)
-        self.notes += [ADVICE] * any(folded(r) for r in self.records)
-        self.notes += loop_notes(self.data)
+        self.notes += [*[ADVICE] * any(folded(r) for r in self.records), *loop_notes(self.data)]
 
         def search(objective: Objective, most: int, beside: Fit | None) -> Selection:
             shown = [t for t in allowed if t.name not in unresolved(objective.data)], self._equivalent_here, self._say
-            return selected(objective, self.scales, self.idn.model, *shown, min(most, self.most), beside)
+            found = selected(objective, self.scales, self.idn.model, *shown, min(most, self.most), beside)
+            return by_the_angle(found, self.clean, self._equivalent_here, self._say)
 
         found, older = searched(self.objective, self.scales, self.idn.model, allowed, search, self.driving.ticks)
         self.notes += older
@@ -284,7 +286,8 @@ class Work:
         for effect in causes:
             gain, rivals = self.rivals[effect]
             never = impossible_here(effect, {e: estimates[e] for e in causes}) | self.driving.told_by_the_current
-            alternatives = self._alternatives(effect, rivals, offset, never)
+            alone = excluded_by_the_angle(effect, estimates[effect], self.clean)
+            alternatives = tuple(n for n in self._alternatives(effect, rivals, offset, never) if n not in alone)
             self.notes += [or_other_gains(effect)] * (effect in self.gain_doubt.rivals)
             ends = ends_of(self.found.space, self.final, effect, [r.effect for r in rivals])
             known = estimates[effect], self.data.velocity
@@ -390,10 +393,8 @@ class Work:
         return tuple(n for n in dict.fromkeys(map(name_of, names)) if n != name_of(effect) and n not in self.not_testable)
 
     def _only_describes(self, effect: str, driver: str | None) -> bool:
-        of_class = bool(self._equivalent_here(effect))
-        return attribution.only_describes(
-            self.found.space, self.final, effect, self.rivals[effect][0], driver, self.left, of_class
-        )
+        gain, of_class = self.rivals[effect][0], bool(self._equivalent_here(effect))
+        return attribution.only_describes(self.found.space, self.final, effect, gain, driver, self.left, of_class)
 
     def _equivalent_here(self, effect: str) -> set[str]:
         return alike_here(effect, self.excited, self.data.torque_logged) - set(self.not_testable)

@@ -11,11 +11,9 @@ from gaident.axis import Text, say
 from gaident.data.record import Record
 from gaident.diagnosis.controller.controller_place import AtController
 from gaident.diagnosis.experiments.excitation import Excitation, decided_by_the_angle
-from gaident.diagnosis.library.equivalences import equivalents
 from gaident.diagnosis.library.terms import LIBRARY
 from gaident.diagnosis.records.folded import FOLDED, folded
 from gaident.estimation.dataset import DataSet
-from gaident.estimation.regression.sensor_lag import angle_is_ahead
 from gaident.estimation.term import Term
 from gaident.policy.table import POLICY
 
@@ -34,9 +32,6 @@ NOT_THE_LOOP = say(
     "the verdict rests on that. Effects inside the controller are not looked for."
 )
 """The same of a log whose torque does not follow from the controller."""
-BEHIND_THE_ANGLE = say(
-    "the velocity is late behind the logged {angle}: its filter is named, and a lag beside that looks the same"
-)
 
 
 def loop_notes(data: DataSet) -> list[Text]:
@@ -56,8 +51,6 @@ def candidates(
     if data.torque_measured:
         behind = say("the {torque} was measured behind the actuator, which it does not show")
         why |= {t.name: behind for t in LIBRARY.values() if t.place == "actuator"}
-    if all(map(angle_is_ahead, clean)):
-        why |= {name: BEHIND_THE_ANGLE for t in LIBRARY.values() if t.late for name in equivalents(t.name)}
     inside = [t.name for t in LIBRARY.values() if t.in_controller]
     outside = data.controller is None or data.told_by_torque  # what the controller did stands in its torque: the replay decides
     if outside:

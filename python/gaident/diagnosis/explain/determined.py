@@ -34,5 +34,5 @@ def determined(parameters: Mapping[str, Estimate]) -> bool:
 
 def not_determined(effect: str) -> Text:
     """What is said of an effect whose size the records do not tell."""
-    text = "{} comes closer to these records, but they do not determine one of its parameters: it is not named."
+    text = "{} comes closer to these records, but they do not say how large it is, nor that it is there: it is not named."
     return say(text, called_of(effect).begun())

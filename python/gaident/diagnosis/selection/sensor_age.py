@@ -46,7 +46,7 @@ from gaident.diagnosis.selection.torque_ahead import ahead_of_line, closer
 from gaident.estimation import least_squares as ls
 from gaident.estimation.dataset import DataSet
 from gaident.estimation.noise_model import WHITE
-from gaident.estimation.objective import Fit, Innovations, Objective
+from gaident.estimation.objective import Fit, Hypothesis, Innovations, Objective
 from gaident.estimation.regression.torque_lag import TorqueLag
 from gaident.estimation.term import Scales, Term
 from gaident.models.drive_torque import HALF
@@ -194,26 +194,32 @@ def _better(again: Selection, found: Selection, margin: float) -> bool:
 
 def _no_difference(found: Selection, younger: Objective, search: Callable[[Fit], Selection]) -> Selection | None:
     """What a search with the age of 0 ends with, where the model that was found speaks for that age; else None."""
-    closest, gain = _of_other_age(found, younger)
+    closest, gain = _of_other_age(found, younger, ())
     if gain < (POLICY.rival_margin if len(closest.effects) == len(found.final.effects) else 0.0):
         return None
     again = search(closest)
-    return again if _better(again, found, POLICY.rival_margin) else None
+    more = _in_series(again.final) - _in_series(closest)
+    return again if more <= 0 and _better(again, found, POLICY.rival_margin) else None
+
+
+def _in_series(fit: Fit) -> int:
+    return sum(t.in_series for t in fit.parameters.terms)
 
 
 def _over_older(found: Selection, older: Objective, margin: float) -> tuple[Fit, bool]:
     """(the model that was found, fitted to the older velocities; whether it is better there by this margin [BIC units])."""
-    closest, gain = _of_other_age(found, older)
+    closest, gain = _of_other_age(found, older, found.space.in_other_series(found.final.hypothesis, found.final.x))
     return closest, gain > margin
 
 
-def _of_other_age(found: Selection, other: Objective) -> tuple[Fit, float]:
+def _of_other_age(found: Selection, other: Objective, exchanged: Sequence[tuple[Hypothesis, Vector]]) -> tuple[Fit, float]:
     """(the model that was found, fitted to velocities of another age; by how much it scores better there [BIC units]).
 
-    As it is, without one of its lags and delays, or with another one in the place of that, whichever scores best.
+    As it is, without one of its lags and delays, or as one of those with another one in the place of that, whichever scores best.
+    A velocity that is a difference over several samples has an age of its own.
     """
     space, final = found.space, found.final
-    tries = [final, *(replace(final, hypothesis=h, x=x) for h, x in space.in_other_series(final.hypothesis, final.x))]
+    tries = [final, *(replace(final, hypothesis=h, x=x) for h, x in exchanged)]
     for term in final.parameters.terms:
         if term.in_series:
             x = final.parameters.removed(final.x, term.name)

@@ -97,9 +97,9 @@ class SideMoves(ModelSpace):
         return [] if best.cost >= WORST or not shown else [self.refitted(best.hypothesis, best.x, self.policy.long)]
 
     def screened_at_load(self, now: Fit) -> list[Term]:
-        """What is screened at the load, beside what is screened at the motor: harmonic torques and the simplest dry friction.
+        """What is screened at the load, beside what is screened at the motor: the effects of the shaft that generalise no other.
 
-        Of these a log may have nothing that one at the motor explains.
+        A log may have nothing of them that one at the motor explains.
         """
         if now.parameters.masses == 1 or not self.swings(now):
             return []

@@ -47,6 +47,8 @@ def long_run(scores: Matrix) -> Matrix:
     B is the sum over a window that slides over the record, its ends included.
     """
     n = len(scores)
+    if n == 0:
+        return np.zeros((scores.shape[1],) * 2)
     window = min(int(np.ceil(POLICY.lags_per_root * np.sqrt(n))), n - 1) + 1
     sums = np.zeros((n + 2 * window - 1, scores.shape[1]))
     sums[window : window + n] = np.cumsum(scores, axis=0)

@@ -349,7 +349,9 @@ def _number(logs: Sequence[Log], scheme: Scheme, controller: Cascade, at_rate: b
     others = [] if at_rate else [replace(controller, velocity=replace(controller.velocity, rule=rule)) for rule in RULES]
     by_rule = max((abs(nearest(other).number - scheme.number) for other in others), default=0.0)
     limit = POLICY.at_limit * controller.velocity.limits[0]
-    within = 0.0 if at_rate else nearest(controller, [np.abs(log.torque) < limit for log in logs]).number - scheme.number
+    shown, within = [np.abs(log.torque) < limit for log in logs], 0.0
+    if scheme.kind == DECAY and not at_rate and any(one.any() for one in shown):
+        within = nearest(controller, shown).number - scheme.number
 
     def made(by: float = 0.0, straight: bool = False) -> Vector:
         torques = (_made(of(scheme.number + by), controller, log, straight)[:: _every(log)] for log in logs)
