@@ -1,11 +1,12 @@
-"""Prints how large an installation is, without extras and with each: `python docs/tools/sizes.py gaident-0.2.0-....whl`.
+"""Prints how large an installation is, without what draws and with each extra: `docs/tools/sizes.py gaident-0.2.0-....whl`.
 
 Each is installed into an empty folder by pip. MB are 10^6 bytes of the files, not of the blocks that a disk gives them.
-An extra's size is that of the distributions that an installation without extras has not.
+The size of `pictures` is that of the distributions that what draws brings, that of another extra of those that it brings beside.
 """
 
 from __future__ import annotations
 
+import re
 import subprocess
 import sys
 import tempfile
@@ -13,7 +14,8 @@ from collections.abc import Iterable
 from importlib.metadata import Distribution, distributions
 from pathlib import Path
 
-FOR_DEVELOPERS = {"test", "peers", "compare", "tidy", "docs", "release"}
+FOR_DEVELOPERS = {"test", "peers", "compare", "naming", "tidy", "docs", "release"}
+DRAWS = "pictures"  # the extra of what draws, which is required, too
 LISTED = 5  # of the largest distributions
 
 
@@ -28,12 +30,17 @@ def total(found: Distribution, bytecode: bool) -> float:
     return sum(path.stat().st_size for path in paths if (path.suffix == ".pyc") == bytecode and path.is_file()) / 1e6
 
 
-def installed(what: str) -> dict[str, tuple[float, float]]:
-    """The distributions that pip installs for a requirement."""
+def installed(*what: str) -> dict[str, tuple[float, float]]:
+    """The distributions that pip installs for these requirements, or with these options."""
     with tempfile.TemporaryDirectory() as folder:
-        call = [sys.executable, "-m", "pip", "install", "--quiet", "--only-binary=:all:", "--target", folder, what]
+        call = [sys.executable, "-m", "pip", "install", "--quiet", "--only-binary=:all:", "--target", folder, *what]
         subprocess.run(call, check=True)
         return sizes(Path(folder))
+
+
+def name_of(requirement: str) -> str:
+    found = re.match(r"[\w.-]+", requirement)
+    return found[0] if found else ""
 
 
 def row(name: str, found: dict[str, tuple[float, float]], kept: Iterable[str]) -> str:
@@ -46,13 +53,18 @@ def row(name: str, found: dict[str, tuple[float, float]], kept: Iterable[str]) -
 
 def main(wheel: str) -> None:
     """Print the table."""
-    extras = next(iter(distributions(path=[wheel]))).metadata.get_all("Provides-Extra") or []
-    base = installed(wheel)
+    package = next(iter(distributions(path=[wheel])))
+    extras, asked = package.metadata.get_all("Provides-Extra") or [], package.requires or []
+    draws = {name_of(r) for r in asked if f'"{DRAWS}"' in r or f"'{DRAWS}'" in r}
+    required = [r for r in asked if "extra ==" not in r and "python_version" not in r]
+    base = {**installed("--no-deps", wheel), **installed(*(r for r in required if name_of(r) not in draws))}
+    usual = installed(wheel)
     print("| extra | files [MB] | with bytecode [MB] | the largest, with bytecode [MB] |\n|---|---|---|---|")
-    print(row("none", base, base))
-    for extra in sorted({*extras} - FOR_DEVELOPERS):
+    print(row("none, without what draws", base, base))
+    print(row(f"`{DRAWS}`", usual, sorted({*usual} - {*base})), flush=True)
+    for extra in sorted({*extras} - FOR_DEVELOPERS - {DRAWS}):
         found = installed(f"{wheel}[{extra}]")
-        print(row(f"`{extra}`", found, sorted({*found} - {*base})), flush=True)
+        print(row(f"`{extra}`", found, sorted({*found} - {*usual})), flush=True)
 
 
 if __name__ == "__main__":

@@ -117,7 +117,11 @@ def _libraries() -> list[UsedLibrary]:
             continue
         name, marker = match[1], match[3] or ""
         extra = _EXTRA.search(marker)
-        if (extra is not None and extra[1] in _FOR_DEVELOPERS) or "python_version" in marker or name in (*found, "gaident"):
+        if (extra is not None and extra[1] in _FOR_DEVELOPERS) or "python_version" in marker or name == "gaident":
+            continue
+        if name in found:
+            if extra is not None and found[name].version is None:
+                found[name] = UsedLibrary(name, None, extra[1])  # what draws may be taken out: it is in an extra of its own, too
             continue
         lowest = _LOWEST.search(match[2])
         found[name] = _library(name, "" if extra is None else extra[1], "" if lowest is None else lowest[1])

@@ -10,7 +10,7 @@ import pytest
 
 import gaident as ga
 from cli_cases import LOOP, NAMES, refusal
-from gaident.cli import main
+from gaident.cli import examination, main
 from gaident.cli.commands import reproduce
 from places import GOLDEN
 
@@ -62,3 +62,21 @@ def test_methods_that_draw_say_what_to_install(here: Path) -> None:
             draw()
     with pytest.raises(ga.GaidentError, match="a report needs matplotlib and plotly, which are not installed"):
         ga.report(dia, here / "a.html")
+
+
+def test_doctor_finds_no_fault_in_an_installation_without_what_draws(monkeypatch: pytest.MonkeyPatch) -> None:
+    asked = ["numpy>=1.26", "matplotlib>=3.6.3", 'matplotlib>=3.6.3; extra == "test"', 'matplotlib>=3.6.3; extra == "pictures"']
+    monkeypatch.setattr(examination.metadata, "requires", lambda name: asked)
+    whole = examination.metadata.version
+
+    def version(name: str) -> str:
+        if name == "matplotlib":
+            raise examination.metadata.PackageNotFoundError(name)
+        return whole(name)
+
+    monkeypatch.setattr(examination.metadata, "version", version)
+    used = {x.name: x for x in examination._libraries()}
+    assert used["matplotlib"].extra == "pictures" and not used["matplotlib"].flaw
+    assert not used["numpy"].extra
+    asked.pop()  # what no extra installs is missing
+    assert "not installed" in {x.name: x for x in examination._libraries()}["matplotlib"].flaw
