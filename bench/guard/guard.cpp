@@ -180,6 +180,10 @@ double effect_instructions(const EffectKernel& kernel, bool alone, const std::st
     run.substeps = 2;
     run.order = 3;
     run.velocity = velocity.data();
+    class GoesOn final : public EffectSink {
+        bool take(std::size_t) override { return true; }
+    } goes_on;
+    run.sink = &goes_on;
     std::vector<Effects::Tables> tables(width);
     for (std::size_t lane = 0; lane < width; ++lane) {
         PreparedEffects c;
