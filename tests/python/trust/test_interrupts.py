@@ -17,6 +17,7 @@ WORK = """
 import os, signal, sys, threading, time
 import numpy as np
 import gaident as ga
+signal.signal(signal.SIGINT, signal.default_int_handler)  # some shells start jobs with it ignored
 n = 1_000_000
 drive, pi = ga.TwoMass(JM=1.02e-4, DM=0.003, JL=5.815e-4, DL=0.008, KG=2.59).model(), ga.PI(0.02, 0.6)
 command = np.repeat(np.random.default_rng(0).uniform(-50.0, 50.0, n // 1000), 1000)
