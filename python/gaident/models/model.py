@@ -50,7 +50,7 @@ class Model:
     Raises
     ------
     ModelError
-        For a gain of 0 or of a size below 1e-90 or above 1e90, roots beyond 1e15 rad/s or without their conjugates, more zeros
+        For a gain of 0 or of a size below 1e-300 or above 1e250, roots beyond 1e50 rad/s or without their conjugates, more zeros
         than poles, and effects that the model cannot carry.
 
     Examples

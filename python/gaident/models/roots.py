@@ -16,9 +16,10 @@ from gaident.errors import ModelError
 ASYMMETRY = 1e-9  # no decision: rounding
 # An imaginary part this small cannot be told from rounding of the root itself.
 NO_IMAGINARY_PART = 1e-13  # no decision: rounding
-# So large that no drive is refused, so small that the polynomials of 14 roots times a gain are numbers.
-LARGEST_ROOT = 1e15  # no decision: what an argument may be [rad/s]
-LARGEST_GAIN = 1e90  # no decision: what an argument may be [(rad/s)^(p+1)/(N m)]
+# Far beyond any drive, and beyond where a search may stray; what is larger, or smaller, is a wrong unit or no number at all.
+LARGEST_ROOT = 1e50  # no decision: what an argument may be [rad/s]
+LARGEST_GAIN = 1e250  # no decision: what an argument may be [(rad/s)^(p+1)/(N m)]
+SMALLEST_GAIN = 1e-300  # no decision: what an argument may be [(rad/s)^(p+1)/(N m)]
 
 
 class Mode(NamedTuple):
@@ -59,9 +60,9 @@ def checked_gain(gain: object) -> float:
     number = real_number(gain, "gain", ModelError, "give one finite real number, not 0")
     if number == 0.0:
         raise ModelError("gain is 0: such a model never moves; give one finite real number, not 0")
-    if not 1.0 / LARGEST_GAIN <= abs(number) <= LARGEST_GAIN:
+    if not SMALLEST_GAIN <= abs(number) <= LARGEST_GAIN:
         raise ModelError(
-            f"gain is {number:g}, whose size no drive has ({1.0 / LARGEST_GAIN:g} to {LARGEST_GAIN:g}): correct its unit, or "
+            f"gain is {number:g}, whose size no drive has ({SMALLEST_GAIN:g} to {LARGEST_GAIN:g}): correct its unit, or "
             "take out a pole or a zero that is far beyond the others"
         )
     return number

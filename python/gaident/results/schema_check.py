@@ -45,7 +45,7 @@ def _is_newer(made_by: object) -> bool:
     def numbers(text: str) -> list[int]:
         return [int(part) for part in re.findall(r"\d+", text)]
 
-    return isinstance(made_by, str) and numbers(made_by)[:3] > numbers(version())[:3]
+    return isinstance(made_by, str) and numbers(made_by) > numbers(version())
 
 
 Place = tuple[str | int, ...]

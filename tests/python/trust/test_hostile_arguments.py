@@ -322,11 +322,11 @@ def test_every_public_function_has_a_row() -> None:
         ("Parameter", {"logarithmic": None}, "logarithmic of size of mine is None: give True or False"),
         ("idn.plot_bode", {"hz": "no"}, "hz is 'no': give True or False"),
         ("Model", {"gain": 1e300}, r"gain is 1e\+300, whose size no drive has .*: correct its unit"),
-        ("Model", {"gain": -1e-91}, r"gain is -1e-91, whose size no drive has"),
+        ("Model", {"gain": -1e-305}, r"gain is -1e-305, whose size no drive has"),
         ("Model", {"poles": [-1.0, -1e200]}, r"poles\[1\] is -1e\+200.*, which no drive has .*: give it in rad/s"),
         ("Model", {"zeros": [-1e250]}, r"zeros\[0\] is -1e\+250.*, which no drive has"),
         ("OneMass", {"J": 1e300}, r"J is 1e\+300, which no drive has"),
-        ("OneMass", {"J": 1e-20, "D": 1e20}, r"J is 1e-20 and D is 1e\+20: poles\[0\] is -1e\+40"),
+        ("OneMass", {"J": 1e-25, "D": 1e28}, r"J is 1e-25 and D is 1e\+28: poles\[0\] is -1e\+53"),
         ("with_effect", {"torque": 1e300}, r"torque of coulomb_friction is 1e\+300, which no drive has"),
         (
             "factor_parameters",
