@@ -1,12 +1,13 @@
-"""Prints how large an installation is, without what draws and with each extra: `docs/tools/sizes.py gaident-0.2.0-....whl`.
+"""Prints how large an installation is, without an extra and with each: `docs/tools/sizes.py gaident-0.2.0-....whl`.
 
 Each is installed into an empty folder by pip. MB are 10^6 bytes of the files, not of the blocks that a disk gives them.
-The size of `pictures` is that of the distributions that what draws brings, that of another extra of those that it brings beside.
+The size of an extra is that of the distributions that it brings.
+
+`docs/tools/sizes.py ENVIRONMENT` prints the row of what is installed there, without extras; it fails where that is LIMIT or more.
 """
 
 from __future__ import annotations
 
-import re
 import subprocess
 import sys
 import tempfile
@@ -15,13 +16,20 @@ from importlib.metadata import Distribution, distributions
 from pathlib import Path
 
 FOR_DEVELOPERS = {"test", "peers", "compare", "naming", "tidy", "docs", "release"}
-DRAWS = "pictures"  # the extra of what draws, which is required, too
 LISTED = 5  # of the largest distributions
+LIMIT = 200.0  # MB, of the files without bytecode
+INSTALLERS = {"pip", "setuptools", "wheel"}  # what a new environment has before anything is installed
 
 
 def sizes(folder: Path) -> dict[str, tuple[float, float]]:
     """Each distribution's files and the bytecode that pip makes of them [MB]."""
     return {found.name: (total(found, False), total(found, True)) for found in distributions(path=[str(folder)])}
+
+
+def packages_of(environment: Path) -> Path:
+    """Its site-packages."""
+    folders = [*environment.glob("lib/python*/site-packages"), *environment.glob("Lib/site-packages")]
+    return folders[0] if folders else environment
 
 
 def total(found: Distribution, bytecode: bool) -> float:
@@ -33,14 +41,19 @@ def total(found: Distribution, bytecode: bool) -> float:
 def installed(*what: str) -> dict[str, tuple[float, float]]:
     """The distributions that pip installs for these requirements, or with these options."""
     with tempfile.TemporaryDirectory() as folder:
-        call = [sys.executable, "-m", "pip", "install", "--quiet", "--only-binary=:all:", "--target", folder, *what]
-        subprocess.run(call, check=True)
-        return sizes(Path(folder))
-
-
-def name_of(requirement: str) -> str:
-    found = re.match(r"[\w.-]+", requirement)
-    return found[0] if found else ""
+        call = [
+            sys.executable,
+            "-m",
+            "pip",
+            "install",
+            "--quiet",
+            "--only-binary=:all:",
+            "--ignore-installed",
+            "--prefix",
+            folder,
+        ]
+        subprocess.run([*call, *what], check=True)  # into a prefix: what a package has beside its modules counts, too
+        return sizes(packages_of(Path(folder)))
 
 
 def row(name: str, found: dict[str, tuple[float, float]], kept: Iterable[str]) -> str:
@@ -53,19 +66,29 @@ def row(name: str, found: dict[str, tuple[float, float]], kept: Iterable[str]) -
 
 def main(wheel: str) -> None:
     """Print the table."""
-    package = next(iter(distributions(path=[wheel])))
-    extras, asked = package.metadata.get_all("Provides-Extra") or [], package.requires or []
-    draws = {name_of(r) for r in asked if f'"{DRAWS}"' in r or f"'{DRAWS}'" in r}
-    required = [r for r in asked if "extra ==" not in r and "python_version" not in r]
-    base = {**installed("--no-deps", wheel), **installed(*(r for r in required if name_of(r) not in draws))}
-    usual = installed(wheel)
+    extras = next(iter(distributions(path=[wheel]))).metadata.get_all("Provides-Extra") or []
+    base = installed(wheel)
     print("| extra | files [MB] | with bytecode [MB] | the largest, with bytecode [MB] |\n|---|---|---|---|")
-    print(row("none, without what draws", base, base))
-    print(row(f"`{DRAWS}`", usual, sorted({*usual} - {*base})), flush=True)
-    for extra in sorted({*extras} - FOR_DEVELOPERS - {DRAWS}):
+    print(row("none", base, base))
+    for extra in sorted({*extras} - FOR_DEVELOPERS):
         found = installed(f"{wheel}[{extra}]")
-        print(row(f"`{extra}`", found, sorted({*found} - {*usual})), flush=True)
+        print(row(f"`{extra}`", found, sorted({*found} - {*base})), flush=True)
+
+
+def check(environment: Path) -> None:
+    """Fail where an environment's files are too large."""
+    folder = packages_of(environment)
+    found = {name: size for name, size in sizes(folder).items() if name not in INSTALLERS}
+    print(row("installed", found, found))
+    files = sum(size for size, _ in found.values())
+    if not 0.0 < files < LIMIT:
+        sys.exit(f"{folder} has {files:.0f} MB of files, not below {LIMIT:.0f} MB")
 
 
 if __name__ == "__main__":
-    main(sys.argv[1])
+    if len(sys.argv) != 2 or not Path(sys.argv[1]).exists():
+        sys.exit(__doc__)
+    if Path(sys.argv[1]).is_dir():
+        check(Path(sys.argv[1]))
+    else:
+        main(sys.argv[1])
