@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from gaident.policy.declared import NUMBERS, loop
+from gaident.policy.declared import FORMS, NUMBERS, loop
 
 __all__ = ["ControllerRanges"]
 
@@ -20,6 +20,9 @@ class ControllerRanges:
         0.05, "periods", "time constant of a filter at least: a shorter one leaves e^-20 of a step to the next sample", NUMBERS
     )
     filter_slowest: float = loop(1e5, "periods", "the same at most: 100 s at 1 kHz, beyond which it is an integrator", NUMBERS)
+    limit_apart: float = loop(
+        0.8, "1", "of the torque's plateau behind a filter, the limit before it at least, and the plateau of that limit", FORMS
+    )
     notch_slowest: float = loop(
         1e-4, "1", "of the controller's sampling frequency, the lowest of a notch: 0.1 Hz at 1 kHz", NUMBERS
     )

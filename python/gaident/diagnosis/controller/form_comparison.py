@@ -27,7 +27,17 @@ from gaident.estimation.projection import inverse_of
 from gaident.identification.replay.causes import white_noise
 from gaident.policy.table import POLICY
 
-__all__ = ["Fitted", "compared", "fitted_form", "fitted_with_times", "gains_of", "least_seen", "rivals_of", "shape_of"]
+__all__ = [
+    "Fitted",
+    "compared",
+    "fitted_form",
+    "fitted_with_times",
+    "gains_of",
+    "least_seen",
+    "rivals_of",
+    "shape_of",
+    "simplest_first",
+]
 
 Vector = NDArray[np.float64]
 Matrix = NDArray[np.float64]
@@ -176,6 +186,18 @@ def gains_of(candidates: Sequence[FormCandidate]) -> dict[str, float]:
     best = candidates[0]
     without = {name: [c.criterion for c in candidates if name not in c.names] for name in best.names}
     return {name: min(others) - best.criterion if others else np.inf for name, others in without.items()}
+
+
+def simplest_first(candidates: Sequence[FormCandidate]) -> list[FormCandidate]:
+    """The forms to try: where the given gains leave as little, settings without a number of their own, before other numbers.
+
+    Forms of fewer numbers that the criterion does not tell from the best come before it.
+    """
+    plain = [c for c in candidates if not c.names]
+    as_free = [c for c in candidates if plain and c.count == plain[0].count and c.shape is plain[0].shape and not c.form.free]
+    alike = [c for c in candidates if c.criterion - candidates[0].criterion < POLICY.rival_margin]
+    fewer = sorted((c for c in alike if c.count < candidates[0].count), key=lambda c: c.count)
+    return list(dict.fromkeys([*as_free[:1], *plain[:1], *fewer[:1], candidates[0]]))
 
 
 def rivals_of(candidates: Sequence[FormCandidate]) -> tuple[tuple[str, ...], ...]:

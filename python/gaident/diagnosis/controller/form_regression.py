@@ -232,7 +232,7 @@ def law_of(
 
 
 def quiet_law(law: Law, memory: int) -> Law | None:
-    """The regression in the stretches of small torques, of a log with a line for each of the controller's samples.
+    """The regression in the stretches of small torques; memory: in lines of the log.
 
     A limit acts at large torques only: also a limit before a filter, whose output shows no plateau, or one with an anti-windup.
     A stretch begins `memory` lines after the last large torque, when its effect in the filters is over, and has its own integral.

@@ -44,6 +44,7 @@ from gaident.diagnosis.controller.form_comparison import (
     least_seen,
     rivals_of,
     shape_of,
+    simplest_first,
 )
 from gaident.diagnosis.controller.form_regression import Law, law_of, quiet_law
 from gaident.diagnosis.controller.slow_forms import Limited, follow, limited, run_error, too_fast
@@ -126,15 +127,32 @@ def _form_of(
         return None
     if law.every > 1:
         following = _following(records, candidates, given, floor)
-        open_times = between and law.around is None and (following is None or not following.strictly)
-        unsure = jumps_of(records, law.every, law.lengths) if open_times else None
-        if unsure is not None:
-            told = _told(records, given, compared(law, given, floor, unknown, unsure, candidates[0].shape))
-            if told is not None:
-                return _with_simpler(_with_limit(told.records, given, told.candidates, told.fitted), records, given, candidates)
-        return _with_simpler(_shown_slowly(records, given, candidates, following), records, given, candidates)
+        slowly = _form_slowly(records, given, unknown, law, floor, candidates, following, between)
+        if slowly is not None and (following is None or following.form in simplest_first(candidates)):
+            return slowly
+        return _shown_quietly(records, law, given, floor, unknown, most) or slowly
     shown = _shown(records, law, given, candidates) if candidates[0].names else None
-    return shown or _shown_quietly(records, law, given, floor, unknown)
+    return shown or _shown_quietly(records, law, given, floor, unknown, most)
+
+
+def _form_slowly(
+    records: Sequence[Record],
+    given: PI,
+    unknown: tuple[str, ...],
+    law: Law,
+    floor: float,
+    candidates: Sequence[FormCandidate],
+    following: _Following | None,
+    between: bool,
+) -> Shown | None:
+    """The same of a slower log; following: the first of the candidates from which its torque follows."""
+    open_times = between and law.around is None and (following is None or not following.strictly)
+    unsure = jumps_of(records, law.every, law.lengths) if open_times else None
+    if unsure is not None:
+        told = _told(records, given, compared(law, given, floor, unknown, unsure, candidates[0].shape))
+        if told is not None:
+            return _with_simpler(_with_limit(told.records, given, told.candidates, told.fitted), records, given, candidates)
+    return _with_simpler(_shown_slowly(records, given, candidates, following), records, given, candidates)
 
 
 def _allowed(records: Sequence[Record], law: Law, controller: PI) -> list[float]:
@@ -178,13 +196,6 @@ def _shown(records: Sequence[Record], law: Law, given: PI, candidates: Sequence[
     )
 
 
-def _simplest_first(candidates: Sequence[FormCandidate]) -> list[FormCandidate]:
-    """The forms to try: where the given gains leave as little, settings without a number of their own, before other numbers."""
-    plain = [c for c in candidates if not c.names]
-    as_free = [c for c in candidates if plain and c.count == plain[0].count and c.shape is plain[0].shape and not c.form.free]
-    return list(dict.fromkeys([*as_free[:1], *plain[:1], candidates[0]]))
-
-
 class _Following(NamedTuple):
     """A form from which the torque of a slower log follows; fitted: its numbers, see `fitted_form`.
 
@@ -204,7 +215,7 @@ def _following(records: Sequence[Record], candidates: Sequence[FormCandidate], g
     Where none does, the best if it differs in filters and the rule alone, and the torque follows from it as it is asked of a
     given controller: white noise of a measured torque is left there, too, beside which other numbers fit what they are not.
     """
-    first = _simplest_first(candidates)
+    first = simplest_first(candidates)
     with_filters = list({c.shape.places: c for c in reversed(candidates)}.values())
     rest = sorted((c for c in with_filters if c not in first), key=lambda c: c.criterion)
     for best in (*first, *rest):
@@ -269,7 +280,7 @@ class _Told(NamedTuple):
 
 def _told(records: Sequence[Record], given: PI, candidates: Sequence[FormCandidate]) -> _Told | None:
     """The simplest form with which the torque tells when the command jumped between the lines; None: with none."""
-    for best in _simplest_first(candidates):
+    for best in simplest_first(candidates):
         one, fitted = fitted_with_times(best, given)
         controller = replace(controller_of(best, *fitted[:2], given, best.law.period), period=best.law.period)
         known = timed(records, limited(records, controller).controller)
@@ -282,14 +293,22 @@ def _first(best: FormCandidate, candidates: Sequence[FormCandidate]) -> list[For
     return [best, *(c for c in candidates if c is not best)]
 
 
-def _shown_quietly(records: Sequence[Record], law: Law, given: PI, floor: float, unknown: tuple[str, ...]) -> Shown | None:
+def _shown_quietly(
+    records: Sequence[Record], law: Law, given: PI, floor: float, unknown: tuple[str, ...], most: int
+) -> Shown | None:
     """The same where it follows at small torques only: the comparison uses only samples at which no limit acts."""
     # no decision: a quarter of it where few samples are left, as the row of filter_memory says
     for memory in (POLICY.filter_memory, POLICY.filter_memory // 4):
-        quiet = quiet_law(law, memory)
-        candidates = [] if quiet is None else compared(quiet, given, floor, unknown)
+        quiet = quiet_law(law, -(-memory // law.every))
+        candidates = [] if quiet is None else compared(quiet, given, floor, unknown, most=most)
         if quiet is None or not candidates:
             continue
+        if law.every > 1:
+            following = _following(records, candidates, given, floor)
+            slowly = _form_slowly(records, given, unknown, quiet, floor, candidates, following, between=False)
+            if slowly is None:
+                continue
+            return slowly
         best = candidates[0]
         fitted = fitted_form(best, given)
         left = shape_of(best, fitted).left

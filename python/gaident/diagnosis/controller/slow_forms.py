@@ -28,6 +28,7 @@ __all__ = ["Limited", "follow", "limited", "run_error", "time_std", "too_fast", 
 Vector = NDArray[np.float64]
 
 SUM_ROUNDING = 1e-9  # no decision: of a torque, what a sum is exact to
+LIMIT_EXACT = 1e-6  # no decision: of a solver: where its search ends, of a plateau
 TIME_EXACT = 1e-10  # no decision: of a solver: where its search ends, of the logarithm of a time
 TIMES = np.geomspace(0.3e-3, 0.3, POLICY.tracking_times)  # no decision: a start; s
 NEXT_TIME = float(TIMES[1] / TIMES[0])
@@ -87,10 +88,9 @@ def limited(records: Sequence[Record], controller: Cascade) -> Limited:
     At a given limit it is the given anti-windup, where none of them comes closer by the share that a number has to take away.
     Where the torques follow without a limit, as well as their log can show, a plateau is no limit: the top of a swing is flat.
     """
-    filters_unseen = controller.torque_filters and controller.log_every(records[0].dt) > 1
     given = controller.velocity.torque_limit
     in_motion = any(starts_moving(r, None) for r in records)  # no run from rest shows what the integrator does at the limit
-    if filters_unseen or (given is not None and in_motion):
+    if given is not None and in_motion:
         return Limited(controller, None, 0.0)
     if given is not None:
         best = _closest(records, controller, given)
@@ -100,8 +100,12 @@ def limited(records: Sequence[Record], controller: Cascade) -> Limited:
         return Limited(best, None, gain, windup=gain, time_std=_time_std(records, best))
     if follow(records, controller):
         return Limited(controller, None, 0.0)
-    parts = [np.abs(before_filters(r.torque, controller, r.dt)) for r in records if r.torque is not None]
+    slow = controller.log_every(records[0].dt) > 1
+    torques = [(r.torque, r.dt) for r in records if r.torque is not None]
+    parts = [np.abs(torque if slow else before_filters(torque, controller, dt)) for torque, dt in torques]
     limit = plateau_of(np.concatenate(parts))
+    if slow and controller.torque_filters and np.isfinite(limit):
+        limit = _before_filters_of_a_slow_log(records, controller, limit)
     if not np.isfinite(limit) or not limit > 0.0:
         return Limited(controller, None, 0.0)
     if in_motion:
@@ -111,6 +115,21 @@ def limited(records: Sequence[Record], controller: Cascade) -> Limited:
     same = replace(controller, velocity=replace(controller.velocity, torque_limit=limit))
     windup, gain = _by_windup(records, same, best), _gain(records, controller, best)
     return Limited(best, limit, gain, torque_spread(records, limit), windup, _time_std(records, best) if windup > 0.0 else 0.0)
+
+
+def _before_filters_of_a_slow_log(records: Sequence[Record], controller: Cascade, plateau: float) -> float:
+    """The limit [N m] at the torque filters' input with which the controller comes closest to the logged torque.
+
+    plateau: of the logged torque, which is behind the filters: it may overshoot the limit, or not have come up to it.
+    """
+    from scipy.optimize import minimize_scalar
+
+    def off(limit: float) -> float:
+        pi = replace(controller.velocity.winding_up, torque_limit=limit)
+        return run_error(records, replace(controller, velocity=pi))
+
+    bounds = POLICY.limit_apart * plateau, plateau / POLICY.limit_apart
+    return float(minimize_scalar(off, bounds=bounds, method="bounded", options={"xatol": LIMIT_EXACT * plateau}).x)
 
 
 def _by_windup(records: Sequence[Record], given: Cascade, best: Cascade) -> float:
