@@ -43,6 +43,7 @@ from gaident.diagnosis.explain.wording import (
     or_other_gains,
     period_seen,
     torque_unlogged,
+    two_resonances,
 )
 from gaident.diagnosis.gains import Gains, measured_gains, with_effects
 from gaident.diagnosis.judged import Judged
@@ -261,7 +262,7 @@ class Work:
             if why or check.loses or unnamed:
                 driver = driver or self.left.strongest or "time"
                 self.notes += why
-            self.notes += basis_of(self.found, driver is not None)
+            self.notes += basis_of(self.found, driver is not None) + two_resonances(self.final)
             instead = None if causes else by_whitened_errors(self.found, self._equivalent_here, self._say)
             if instead is None:
                 self.notes += gains.notes
@@ -307,9 +308,8 @@ class Work:
         ages, left_open = of_the_age(self.under, self.estimate), self.driving.left_open
         self.notes += (*of_the_mechanics(mechanics, ages, self.data, left_open), *check.notes)
         self.notes += [ON_A_SPRING] * (self.final.parameters.on_a_spring and any(LIBRARY[e].constant for e in self.final.effects))
-        ambiguous = [f for f in real if f.alternatives]
         proposal = None
-        if ambiguous:
+        if ambiguous := [f for f in real if f.alternatives]:
             self.note(0.95, "proposing the next experiment")
             from gaident.diagnosis.experiments.next_experiment import propose
 

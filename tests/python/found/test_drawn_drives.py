@@ -10,6 +10,7 @@ import pytest
 import gaident as ga
 from blind_judge import judge
 from drive_cases import Noise, random_case, two_masses
+from gaident.diagnosis.library.terms import LIBRARY
 from loop_cases import industrial_case, loop_kind, loop_plant
 
 LOAD = "@load"
@@ -95,3 +96,21 @@ def test_a_tracking_time_between_those_of_the_grid_is_no_integrator_that_is_held
     assert windup.parameters["tracking_time"].value == pytest.approx(controller.velocity.tracking_time, rel=1e-3)
     assert dia.verdict == "explained" and {f.effect for f in dia.causes if f.place != "controller"} == {"torque_lag"}
     assert dia.mechanics["inertia"].value == pytest.approx(plant.J + plant.JL, rel=1e-4)
+
+
+def test_a_tone_acts_at_one_end() -> None:
+    """A hum of 24 N m at the load and one of 0.016 N m at the motor cancelled each other, but for the first lines of a record."""
+    motor, load = LIBRARY["torque_hum"], LIBRARY["torque_hum@load"]
+    assert motor.name in load.excludes and load.other_side == motor.name
+    assert "cogging" not in LIBRARY["cogging@load"].excludes
+
+
+@pytest.mark.long
+def test_two_resonances_may_stand_in_each_others_place() -> None:
+    """The model and the whole inertia are right; the parts of it are those of the other choice, by any number of deviations."""
+    record, validation, controller, truth = random_case(4101000000, ("extra_resonance",), "multi", "encoder", False)
+    dia = ga.diagnose(record, controller=controller, validation=validation)
+    whole = truth.plant.J + truth.plant.JL
+    assert abs(dia.mechanics["inertia"].value - whole) < 4.0 * dia.mechanics["inertia"].std
+    assert abs(dia.mechanics["motor_inertia"].value - truth.plant.J) > 100.0 * dia.mechanics["motor_inertia"].std
+    assert any("which of two resonances is that of the shaft" in note for note in dia.notes)

@@ -304,6 +304,16 @@ def test_responses_at_two_amplitudes_hint_at_what_is_not_linear() -> None:
 
 
 @pytest.mark.long
+def test_a_gap_that_less_torque_does_not_cross_is_no_limit_alone() -> None:
+    """In a wide gap a small torque moves the motor alone: the gain falls as the torque grows, as it does at a limit."""
+    free = 1.0 / (2j * np.pi * F * JM + DM)
+    drawn = ((0.05, free), (0.5, exact()))
+    parts = [ga.FrequencyResponse(F, noisy(g, 0.01, 30), 0.01 * np.abs(g), amplitude=size) for size, g in drawn]
+    (note, *_) = (w for w in ga.identify(parts).warnings if w.startswith("Not linear"))
+    assert "smaller; a limit of the torque, or a gap that less torque does not cross, would do that" in note
+
+
+@pytest.mark.long
 def test_what_is_made_of_it(tmp_path: Path) -> None:
     g = noisy(exact(), 0.02, 19)
     fr = ga.FrequencyResponse(F, g, name="bode")

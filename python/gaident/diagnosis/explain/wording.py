@@ -15,6 +15,7 @@ from gaident.diagnosis.library.terms import LIBRARY
 from gaident.diagnosis.selection.offset import Offset
 from gaident.diagnosis.selection.select import Selection
 from gaident.estimation.dataset import DataSet
+from gaident.estimation.objective import Fit
 from gaident.identification.notes import slower_than_the_loop
 from gaident.models.effect_rows import by_wave, end_words
 from gaident.models.effects import row_of
@@ -37,6 +38,7 @@ __all__ = [
     "or_other_gains",
     "period_seen",
     "torque_unlogged",
+    "two_resonances",
 ]
 
 
@@ -123,6 +125,18 @@ def basis_of(found: Selection, left: bool) -> list[Text]:
         depends = "" if left else ", but depends on no signal of these records beyond chance"
         return [Text(f"What the model leaves is more than noise{depends}: the parameters are those of least output error.")]
     return [Text("A noise model would take a cause for noise here: the parameters are those of least output error.")]
+
+
+def two_resonances(final: Fit) -> list[Text]:
+    """Note on an extra resonance beside a shaft: either pair of poles may be the shaft's, and the model is the same."""
+    if final.parameters.masses == 1 or not any(t.resonates for t in final.parameters.terms):
+        return []
+    text = (
+        "No record of the motor's signals tells which of two resonances is that of the shaft and which the extra one: {inertia} "
+        "of motor and of load, stiffness and damping of the shaft are those of one choice. "
+        "The model, and {inertia} of the whole, are the same with the other."
+    )
+    return [say(text)]
 
 
 def not_borne_out(named: Sequence[Finding], kept: Sequence[Finding]) -> Text:

@@ -14,7 +14,10 @@ __all__ = ["at_load", "at_motor", "called_of", "name_of", "sides_of"]
 
 
 def at_load(cause: Cause, excludes: frozenset[str]) -> Cause:
-    """The same effect at the load; excludes: what changes the mechanism linearly, which does not go together with it."""
+    """The same effect at the load; excludes: what changes the mechanism linearly, which does not go together with it.
+
+    A torque of one frequency in time acts at one end: two of them that cancel each other show as little as none.
+    """
 
     def there(name: str) -> str:
         return key_of(name, SIDES[1])
@@ -25,7 +28,7 @@ def at_load(cause: Cause, excludes: frozenset[str]) -> Cause:
         nested=tuple(there(n) for n in cause.nested),
         shared={there(n): places for n, places in cause.shared.items()},
         family=f"{cause.family} at the load" if cause.family else "",
-        excludes=cause.excludes | excludes,
+        excludes=cause.excludes | excludes | ({cause.name} if cause.in_time else set()),
         beside=frozenset(there(n) for n in cause.beside),
         other_side=cause.name,
         at_load=True,

@@ -89,7 +89,8 @@ def compared_notes(responses: Sequence[FrequencyResponse]) -> list[Text]:
     last = "Record a motion and diagnose it to know the cause."
     found = []
     if abs(change) > off_by:
-        way, why = ("larger", "dry friction or a dead band") if change > 0.0 else ("smaller", "a limit of the {torque}")
+        larger, smaller = "dry friction or a dead band", "a limit of the {torque}, or a gap that less {torque} does not cross,"
+        way, why = ("larger", larger) if change > 0.0 else ("smaller", smaller)
         gain = f"the gain at low frequencies is {PERCENT * abs(change):.2g} % {way}"
         found.append(say(f"{between} {gain}; {why} would do that. {last}"))
     if len(peaks) == len(curves) and abs(peaks[1] - peaks[0]) > max(spacing):
