@@ -1,6 +1,7 @@
 """Who names the cause? gaident and its peers on the same blind records, judged by the same code.
 
     pip install .[naming]                       # scikit-learn, PySINDy, SysIdentPy; what is not installed is left out
+    python -m venv build/jax-sysid && build/jax-sysid/bin/pip install "jax-sysid>=1.1"     # for the recurrent network
     python bench/naming.py --out naming.jsonl [--cases 1] [--open-cases 1] [--seed 1] [--only NAME ...] [--workers 1]
     python bench/naming.py --out naming.jsonl --report
 
@@ -34,7 +35,7 @@ sys.path.insert(0, str(BENCH.parent / "tests" / "python" / "support"))
 
 import numpy as np
 from blind import Cell, cells
-from boosted import train
+from boosted import classifiers, train
 from case import Case, drawn
 from in_the_loop import refitted
 from json_lines import read, work
@@ -48,6 +49,8 @@ KINDS = ("multi", "move")
 """Records that a second one is held out beside."""
 EACH = {"clean": 2, "effects": 1, "pairs": 12, "outside": 2, "loops": 1}
 """Numbers of a group that one case has."""
+FORETOLD = ("effects", "pairs", "outside")
+"""Groups with something to predict; what only predicts sees no other one."""
 LOOPS_TAKEN = 13
 """Of the 96 loops of a number every thirteenth is taken, clean ones and others in turn; each number begins at another one."""
 PHASES = ("open", "closed")
@@ -113,7 +116,7 @@ def at_hand(wanted: list[str] | None, training: Path) -> dict[str, Method]:
         if wanted and name not in wanted:
             continue
         if method.missing:
-            print(f"{name} is left out: pip install {' '.join(method.missing)}", file=sys.stderr)
+            print(f"{name} is left out, it needs {', '.join(method.missing)}", file=sys.stderr)
         else:
             found[name] = method
     return found
@@ -146,8 +149,9 @@ def main() -> None:
 def run(options: argparse.Namespace) -> None:
     """Both sets, the open one first: what is chosen by it decides which names are fitted in the loop."""
     found = at_hand(options.only, options.training_file)
-    if "boosted trees" in found:
-        train(options.training_file, options.training, options.workers)
+    learnt = options.training_file if "boosted trees" in found else None
+    if learnt:
+        train(learnt, options.training, options.workers)
     for phase, cases, seed in zip(PHASES, (options.open_cases, options.cases), (options.open_seed, options.seed), strict=True):
         there = read(options.out)
         thresholds: dict[str, str | None] = {}
@@ -159,16 +163,17 @@ def run(options: argparse.Namespace) -> None:
             (answered, cell, phase, name, options.training_file, thresholds[name])
             for group in options.groups
             for cell in cells_of(group, cases, seed)
-            for name in (found if phase == "closed" else [n for n in found if n in named])
+            for name, method in found.items()
+            if name in named or (phase == "closed" and (method.named or group in FORETOLD))
         ]
         began = time.perf_counter()
         jobs = [job for job in jobs if f"{job[2]}/{job[1].key}/{job[3]}" not in there]
-        work(options.out, jobs, options.workers, initializer=quiet)
+        work(options.out, jobs, options.workers, initializer=quiet, initargs=(learnt,))
         print(f"{phase} set: {len(jobs)} answers in {time.perf_counter() - began:.0f} s", file=sys.stderr)
 
 
-def quiet() -> None:
-    """In each process: no warnings of the packages, and their imports before any clock runs."""
+def quiet(learnt: Path | None) -> None:
+    """In each process: no warnings of the packages, and before any clock runs their imports and what the classifier learns."""
     warnings.simplefilter("ignore")
     np.seterr(all="ignore")
     for package in ("pysindy", "sklearn.ensemble", "sysidentpy.model_structure_selection"):
@@ -176,6 +181,8 @@ def quiet() -> None:
             __import__(package)
         except ImportError:
             continue
+    if learnt:
+        classifiers(str(learnt), learnt.stat().st_mtime)
 
 
 if __name__ == "__main__":

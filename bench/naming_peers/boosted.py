@@ -12,19 +12,21 @@ import os
 import time
 import zlib
 from concurrent.futures import ProcessPoolExecutor
+from dataclasses import replace
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from blind import NOISE_KINDS, Cell, case_of
+from blind import NOISE_KINDS, Cell
 from case import Answer, Case
 from in_the_loop import prepared
 from names import library_of, with_parameters, without_contained
 from numpy.typing import NDArray
 
 import gaident as ga
-from drive_cases import EFFECTS, NOISE_EFFECTS, PAIRS
+from drive_cases import EFFECTS, NOISE_EFFECTS, PAIRS, random_truth
+from drive_cases import records as logs
 from drive_rig import AT_LOAD
 
 Vector = NDArray[np.float64]
@@ -84,7 +86,8 @@ def example(number: int) -> tuple[Vector, list[float]] | None:
     """(features, which labels are hidden) of one record of training; None where the effect does not act there."""
     cell = training_cell(number)
     try:
-        case = Case(cell, *case_of(cell))
+        truth = replace(random_truth(cell.seed, cell.effects, cell.kind, cell.noise), validation_command=None)
+        case = Case(cell, *logs(truth), truth.plant.controller, truth)
         with np.errstate(all="ignore"):
             x = features(case)
     except (RuntimeError, ga.GaidentError, np.linalg.LinAlgError):

@@ -83,6 +83,18 @@ def linear(task: Task) -> Fit:
     return ls.fit(task.objective, best.hypothesis, best.x, WHITE, POLICY.usual)
 
 
+def _linear(case: Case) -> Fit:
+    """The linear mechanism of a case: made once."""
+    return case.shared("linear", lambda: linear(prepared(case).task))
+
+
+def mechanism(case: Case) -> ga.Model:
+    """The linear model that other methods begin with: one mass or two."""
+    with one_thread(), np.errstate(all="ignore"):
+        fit = _linear(case)
+        return fit.parameters.model(fit.x)
+
+
 def extended(task: Task, now: Fit, most: int) -> list[Fit]:
     """The model with each effect of the library that may join it, fitted; `most`: candidates by the library's score test."""
     space = task.space()
@@ -177,7 +189,7 @@ def refitted(case: Case, effects: list[str]) -> ga.Model | None:
     """The linear model with effects that another method named, fitted to the record; None where the fit cannot carry them."""
     ready = prepared(case)
     with one_thread(), np.errstate(all="ignore"):
-        now = case.shared("linear", lambda: linear(ready.task))
+        now = _linear(case)
         for name in [e for e in effects if e not in ready.replayed]:
             test = ScoreTest(ready.task.objective)
             terms: list[Any] = [t for t in ready.task.space().candidates(now) if t.name == name]

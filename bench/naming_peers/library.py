@@ -39,6 +39,7 @@ WIDTHS = np.geomspace(0.008, 0.08, 12)  # N m, of a dead band
 SLOW_TURN = 0.3  # of the sampling frequency: a wave of the angle is seen below it
 HUMS = np.arange(5.0, 60.0, 0.5)  # Hz
 SAME = 0.02  # rad/s, where a sign is a straight line
+NOTHING = 1e-18  # of a state is left: earlier samples no longer count
 
 
 @dataclass(frozen=True)
@@ -264,10 +265,15 @@ def bristle(w: Vector, dt: float, rates: tuple[float, ...], risen: float, speed:
     dz/dt = r (w - |w| z/g), g = 1 + (risen - 1) exp(-(w/speed)^2), exact for a velocity that is held within a sample.
     """
     g = 1.0 + (risen - 1.0) * np.exp(-((w / speed) ** 2))
-    keep = np.exp(-np.outer(rates, np.abs(w) / g) * dt).T
-    target = np.sign(w) * g
-    z, out = np.zeros(len(rates)), np.empty((len(w), len(rates)))
-    for i, k in enumerate(keep):
-        z = target[i] + (z - target[i]) * k
-        out[i] = z
-    return out.T
+    keep = np.exp(-np.outer(rates, np.abs(w) / g) * dt)
+    return summed(keep, (1.0 - keep) * np.sign(w) * g)
+
+
+def summed(keep: Vector, more: Vector) -> Vector:
+    """z(k) = keep(k) z(k-1) + more(k) from rest along the last axis, keep in 0..1, arrays (..., n): by doubled strides."""
+    keep, z, stride = keep.copy(), more.copy(), 1
+    while stride < z.shape[-1] and keep[..., stride:].max() > NOTHING:
+        z[..., stride:] += keep[..., stride:] * z[..., :-stride]
+        keep[..., stride:] *= keep[..., :-stride]
+        stride *= 2
+    return z

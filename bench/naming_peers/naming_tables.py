@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 from blind_tables import listing, table
-from scipy.stats import norm
+from scipy.stats import binom, norm
 
 from blind_judge import CLASSES, EQUIVALENT
 from drive_rig import OUTSIDE
@@ -73,9 +73,29 @@ def gain(line: Line, answer: Mapping[str, Any]) -> float | None:
     return float((before - after) / (before - oracle)) if np.isfinite(after) else -np.inf
 
 
-def middle_of(values: Iterable[float | None], unit: str = "") -> str:
+def left_over(line: Line, answer: Mapping[str, Any]) -> float | None:
+    """The held-out rmse over the linear model's, in %; None where there is none."""
+    before, after = line.get("before"), answer["rmse"]
+    return None if after is None or not before else float(100.0 * after / before)
+
+
+def median_interval(values: Sequence[float], level: float = 0.95) -> tuple[float, float]:
+    """Of the median, by order statistics: exact for independent values, at least `level`; infinite for fewer than six."""
+    n = len(values)
+    out = int(binom.ppf(0.5 - 0.5 * level, n, 0.5))  # P(fewer than out of n below the median) stays within the tail
+    if out < 1:
+        return -np.inf, np.inf
+    ordered = sorted(values)
+    return ordered[out - 1], ordered[n - out]
+
+
+def middle_of(values: Iterable[float | None], digits: int = 3) -> str:
+    """Median, its interval, and how many there are."""
     known = [v for v in values if v is not None]
-    return f"{np.median(known):.3g}{unit}" if known else "-"
+    if not known:
+        return "-"
+    low, high = median_interval(known)
+    return f"{np.median(known):.{digits}g} [{low:.{digits}g}, {high:.{digits}g}] (n = {len(known)})"
 
 
 def report(lines: Sequence[Line], lines_of_code: Mapping[str, int], names_nothing: Sequence[str]) -> str:
@@ -100,9 +120,8 @@ def report(lines: Sequence[Line], lines_of_code: Mapping[str, int], names_nothin
             lenient.append([method, _shown(mine, loose), *_names_row([(x, x["answers"][loose]["judged"]) for x in mine])])
         gains = [gain(x, a) for x, a in answers if x["cell"]["group"] in ("effects", "pairs")]
         errors = [e for _, j in judged for e in j["parameter_errors"].values()]
-        known = [g for g in gains if g is not None]
-        figures.append([method, f"{middle_of(gains)} (n = {len(known)})",
-                        f"{100 * np.median(errors):.2g} % (n = {len(errors)})" if errors else "-",
+        outside = [left_over(x, a) for x, a in answers if x["cell"]["group"] == "outside"]
+        figures.append([method, middle_of(gains), middle_of(outside), middle_of((100.0 * e for e in errors), 2),
                         middle_of(x["seconds"] for x in mine), f"{max(x['seconds'] for x in mine):.3g}",
                         lines_of_code[method]])  # fmt: skip
     head = ["method", "threshold", "false alarms", "exact", "in set", "wrong name", "of them its equivalent", "two: both found",
@@ -113,7 +132,19 @@ def report(lines: Sequence[Line], lines_of_code: Mapping[str, int], names_nothin
         table(head, names),
         "The same with thresholds for the most right records, a wrong name costs no more than a missed one:",
         table(head, lenient),
-        table(["method", "held-out gain over the oracle's", "parameter error", "seconds, median", "longest", "lines"], figures),
+        "Medians with their 95 % intervals by order statistics:",
+        table(
+            [
+                "method",
+                "held-out gain over the oracle's",
+                "outside: error left [%]",
+                "parameter error [%]",
+                "seconds",
+                "longest",
+                "lines",
+            ],
+            figures,
+        ),
         table(["method", "clean: named", "hidden: named wrongly"], mistakes),
     ]
     crashed = [f"- {x['key']}: {x['crash']}" for x in lines if "crash" in x]

@@ -1,17 +1,19 @@
 """Black and grey boxes that predict and name nothing: ARX, NARX (SysIdentPy), a rigid axis by output error.
 
-Each runs freely over the held-out record in the loop of the controller that everybody is given.
+Each runs freely over the held-out record in the loop of the controller that everybody is given, with the limits of it that the
+replay shows.
 """
 
 from __future__ import annotations
 
 import sys
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import numpy as np
 from case import Answer, Case
+from in_the_loop import prepared
 from numpy.typing import NDArray
 
 import gaident as ga
@@ -20,30 +22,51 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "measured"))
 import real_fits
 
 Vector = NDArray[np.float64]
+Step = Callable[[Vector, Vector], float]
 ONLY = 0.0
 """The one threshold of a method that has none."""
 
 
-def in_the_loop(case: Case, step: Callable[[Vector, Vector], float], lags: int) -> float | None:
+def in_the_loop(case: Case, step: Step, lags: int, own: bool = False) -> float | None:
     """rmse of w(k) = step(w(k-1)..w(k-L), u(k-1)..u(k-L)) under the PI controller [rad/s]; None without one.
 
-    It starts from rest, as the held-out record does; inf where it diverges.
+    It starts from rest, as the held-out record does (own: the record itself); inf where it diverges.
     """
-    rec, pi = case.validation, case.controller
+    rec, pi = case.record if own else case.validation, case.controller
     if rec is None or not isinstance(pi, ga.PI):
         return None
+    shown = prepared(case).replayed
+    limit = shown.get("integrator_clamp", {}).get("limit", np.inf)
+    command = followed(rec.command, shown.get("command_rate_limit", {}).get("rate", np.inf) * rec.dt)
     w, u = np.zeros(len(rec) + lags), np.zeros(len(rec) + lags)  # at rest before
     integral, before = 0.0, 0.0
     bound = 20.0 * float(np.abs(case.record.velocity).max())
-    for k, r in enumerate(rec.command):
+    for k, r in enumerate(command):
         at = k + lags
         w[at] = step(w[at - lags : at][::-1], u[at - lags : at][::-1]) if k else rec.velocity[0]
         if not abs(w[at]) < bound:
             return float("inf")
         e = float(r - w[at])
-        integral += 0.5 * pi.ki * rec.dt * (e + before)
+        integral = float(np.clip(integral + 0.5 * pi.ki * rec.dt * (e + before), -limit, limit))
         u[at], before = pi.kp * e + integral, e
     return float(np.sqrt(np.mean((rec.velocity - w[lags:]) ** 2)))
+
+
+def closest(case: Case, makes: Sequence[Callable[[], Step]]) -> float | None:
+    """The same of the one that comes closest to the record itself; a step with a state is made anew for each run."""
+    errors = [in_the_loop(case, make(), 1, own=True) for make in makes]
+    known = [np.inf if e is None or np.isnan(e) else e for e in errors]
+    return in_the_loop(case, makes[int(np.argmin(known))](), 1)
+
+
+def followed(command: Vector, step: float) -> Vector:
+    """The command as a controller follows it that changes by no more than `step` a sample."""
+    if not np.isfinite(step):
+        return command
+    found = command.copy()
+    for k in range(1, len(found)):
+        found[k] = found[k - 1] + min(max(command[k] - found[k - 1], -step), step)
+    return found
 
 
 def arx(case: Case) -> dict[float, Answer]:
