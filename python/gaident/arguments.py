@@ -43,7 +43,9 @@ def parts_of(marked: str) -> tuple[str | Argument, ...]:
     found: list[str | Argument] = []
     for i, piece in enumerate(marked.split(_START)):
         reference, end, text = piece.partition(_END)
-        found += [Argument(*reference.split(_NEXT)), text] if i and end else [piece]
+        fields = reference.split(_NEXT)
+        # no decision: a format: what `arg` writes; a text of a user's may contain the same characters
+        found += [Argument(*fields), text] if i and end and len(fields) == 4 else [piece]
     return tuple(p for p in found if p)
 
 

@@ -5,10 +5,12 @@ from __future__ import annotations
 import difflib
 import importlib.util
 import math
+import operator
 import os
 from collections.abc import Iterable, Mapping, Sequence
+from numbers import Integral
 from pathlib import Path
-from typing import TypeVar
+from typing import TypeGuard, TypeVar
 
 from gaident.errors import GaidentError
 
@@ -20,8 +22,7 @@ SHORTEST, LONGEST = 1e-12, 1e9  # no decision: what an argument may be: sample t
 
 def real_number(value: object, name: str, error: type[GaidentError], remedy: str = "give one finite number") -> float:
     """`value` as a finite float; raises `error` naming `name`, the value and the remedy."""
-    # A string is no number here even where float() could read it: it is mostly a forgotten conversion.
-    if isinstance(value, (str, bytes)):
+    if not _is_one_real(value):
         raise error(f"{name} is {value!r}: {remedy}")
     try:
         number = float(value)  # type: ignore[arg-type]
@@ -30,6 +31,27 @@ def real_number(value: object, name: str, error: type[GaidentError], remedy: str
     if not math.isfinite(number):
         raise error(f"{name} is {value!r}: {remedy}")
     return number
+
+
+def _is_one_real(value: object) -> bool:
+    """Whether float() may be asked: of a complex number it would drop a part, and a string is mostly a forgotten conversion."""
+    if isinstance(value, str | bytes) or getattr(value, "ndim", False) or getattr(value, "mask", False):
+        return False
+    kind = getattr(getattr(value, "dtype", None), "kind", "f")
+    if kind == "O":  # an array of one object
+        return _is_one_real(value.item())  # type: ignore[attr-defined]
+    return kind in ("b", "i", "u", "f")
+
+
+def is_whole(value: object) -> TypeGuard[int]:
+    """Whether it is a whole number; a bool is none, nor is a time difference, which NumPy counts among them."""
+    if isinstance(value, bool) or not isinstance(value, Integral):
+        return False
+    try:
+        operator.index(value)
+    except TypeError:
+        return False
+    return True
 
 
 def above_zero(value: object, name: str, error: type[GaidentError], remedy: str) -> float:
@@ -76,6 +98,10 @@ def checked_path(value: object, name: str = "path", error: type[GaidentError] = 
         raise error(f"{name} is '', which names no file or folder: give its name")
     if "\0" in text:
         raise error(f"{name} is {text!r:.80}: no file's name contains the character NUL; correct it")
+    try:
+        os.fsencode(text)
+    except UnicodeEncodeError as reason:
+        raise error(f"{name} is {text!r:.80}: no file's name contains the character {text[reason.start]!r}; correct it") from None
     return Path(text)
 
 

@@ -22,7 +22,8 @@ __all__ = [
     "check_schema",
 ]
 
-_LINE_ENDS = re.compile(r"\s*[\r\n]+\s*")  # of an array that is shown, or of a text in a log
+# Of an array that is shown, or of a text in a log: what str.splitlines takes for one.
+_LINE_ENDS = re.compile(r"\s*[\n\r\v\f\x1c-\x1e\x85\u2028\u2029]+\s*")
 
 
 class GaidentError(ValueError):

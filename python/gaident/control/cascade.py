@@ -324,10 +324,13 @@ class Cascade(Controller):
         allowed = ("velocity", "position_gain", "period", "position_period", *FEEDFORWARDS, *FILTERS, "delay", *WAYS)
         values: dict[str, Any] = known_keys(data, "the cascade", allowed, ("velocity",), ControllerError)
         gain = values.pop("position_gain", None)
-        position = None if gain is None else P(None if gain == UNKNOWN else gain)
+        position = None if gain is None else P(None if isinstance(gain, str) and gain == UNKNOWN else gain)
         values["velocity"] = PI.from_dict(values["velocity"])
         for name in FILTERS:
-            values[name] = tuple(filter_of(one) for one in values.get(name, ()))
+            given = values.get(name, ())
+            if not isinstance(given, Sequence) or isinstance(given, str | bytes):
+                raise ControllerError(f"{name} is {given!r:.80}: give a list of the dictionaries that to_dict gave")
+            values[name] = tuple(filter_of(one) for one in given)
         return cls(position=position, **values)
 
 

@@ -139,6 +139,8 @@ Filter: TypeAlias = LowPass | Notch
 
 def filter_of(data: Mapping[str, Any]) -> LowPass | Notch:
     """The filter of what `to_dict` gave; raises ControllerError."""
+    if not isinstance(data, Mapping):
+        raise ControllerError(f"a filter is {data!r:.80}: give the dictionary that to_dict gave")
     numbers: dict[str, Any] = {key: value for key, value in data.items() if key != "kind"}
     if data.get("kind") == "low pass":
         known_keys(numbers, "the low pass", ("time_constant",), ("time_constant",), ControllerError)

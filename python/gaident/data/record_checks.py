@@ -13,8 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gaident.axis import Text
-from gaident.checks import one_of
-from gaident.data.signals.arrays import MINIMUM_SAMPLES, channel, sample_time
+from gaident.checks import is_whole, one_of
+from gaident.data.signals.arrays import MINIMUM_SAMPLES, channel, is_number, sample_time
 from gaident.data.signals.decimation import decimated
 from gaident.data.signals.wraps import continued, overflow, wrapped_words
 from gaident.data.torque_kind import COMMANDED, HELD, MEAN, SAMPLE, TORQUE_KINDS, TORQUE_LOGS
@@ -153,7 +153,7 @@ def texts(notes: Sequence[str]) -> tuple[str, ...]:
 def moved_channels(channels: Mapping[str, NDArray[np.float64]], samples: Mapping[str, int]) -> dict[str, NDArray[np.float64]]:
     """The channels, each k samples later (negative: earlier), cut to what all cover. Raises RecordError."""
     for key, k in samples.items():
-        if isinstance(k, bool) or not isinstance(k, int | np.integer):
+        if not is_whole(k):
             raise RecordError(f"shifted({key}={k!r}): give a whole number of samples, negative for earlier")
         if key not in channels:
             raise RecordError(f"shifted({key}={k!r}): the record has no {key}; it has {', '.join(channels)}")
@@ -172,7 +172,7 @@ def moved_channels(channels: Mapping[str, NDArray[np.float64]], samples: Mapping
 def check_bounds(t0: object, t1: object) -> None:
     """Raises RecordError for bounds that are not two times [s], the earlier first."""
     for key, value in (("t0", t0), ("t1", t1)):
-        if isinstance(value, bool) or not isinstance(value, int | float | np.integer | np.floating):
+        if not is_number(value):
             raise RecordError(f"between({t0!r}, {t1!r}): {key} is no number; give seconds")
         if value != value:  # NaN; math.isnan fails for whole numbers beyond 1e308
             raise RecordError(f"between({t0!r}, {t1!r}): {key} is NaN; give seconds")

@@ -59,7 +59,11 @@ def _by_executor(work: Work, jobs: Iterator[Job], executor: Any) -> Generator[Ou
     try:
         while True:
             for job in islice(jobs, POLICY.tasks_under_way - len(under_way)):
-                under_way[executor.submit(work, job)] = job
+                future = executor.submit(work, job)
+                if not isinstance(future, Future):
+                    remedy = "give a concurrent.futures.Executor, or a function like map"
+                    raise SettingsError(f"executor.submit gives {future!r:.80}: {remedy}")
+                under_way[future] = job
             if not under_way:
                 return
             for future in wait(under_way, return_when=FIRST_COMPLETED).done:

@@ -6,9 +6,8 @@ import math
 from collections.abc import Sequence
 from dataclasses import replace
 
-import numpy as np
-
 from gaident.arguments import A_CONTROLLER, COMMAND, CONTINUOUS_LOOP, NO_CONTROLLER, TORQUE, arg
+from gaident.checks import is_whole
 from gaident.control.controller import Controller, checked_controller
 from gaident.data.frequency.response import FrequencyResponse
 from gaident.data.record import Record
@@ -59,7 +58,7 @@ def check_numbers(trials: object, seed: object, workers: object, progress: objec
     for name, value, low, high in (("trials", trials, 1, 10**6), ("seed", seed, 0, 2**63 - 1), ("workers", workers, 1, 1024)):
         if value is None and name == "workers":
             continue
-        if isinstance(value, bool) or not isinstance(value, (int, np.integer)) or not low <= value <= high:
+        if not is_whole(value) or not low <= value <= high:
             raise SettingsError(f"{name} is {value!r}: it must be a whole number from {low} to {high}")
 
 

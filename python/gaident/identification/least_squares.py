@@ -18,13 +18,12 @@ Nothing here comes from the core, which it is compared with: numpy and scipy onl
 from __future__ import annotations
 
 from dataclasses import dataclass
-from numbers import Integral
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gaident.arguments import A_CONTROLLER, NO_CONTROLLER
-from gaident.checks import yes_or_no
+from gaident.checks import is_whole, yes_or_no
 from gaident.control.pi import PI, checked_pi
 from gaident.data.record import Record
 from gaident.errors import RecordError, SettingsError
@@ -171,7 +170,7 @@ def least_squares(
     yes_or_no(instruments, "instruments", SettingsError)
     yes_or_no(whitening, "whitening", SettingsError)
     lowest = 1 if controller is None else 2
-    if isinstance(order, bool) or not isinstance(order, Integral) or order < lowest:
+    if not is_whole(order) or order < lowest:
         more = "" if controller is None else " + 1"
         raise SettingsError(f"order is {order!r}: give a whole number N >= {lowest}, p + q{more} of the drive")
     N = int(order)

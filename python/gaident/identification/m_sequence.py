@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-from numbers import Integral
-
 import numpy as np
 from numpy.typing import NDArray
 
-from gaident.checks import real_number
+from gaident.checks import is_whole, real_number
 from gaident.errors import SettingsError
 
 __all__ = ["m_sequence"]
@@ -64,12 +62,12 @@ def m_sequence(register: int, amplitude: float = 1.0, hold: int = 1, offset: flo
     [-2.0, 2.0, 2.0, -2.0, 2.0, -2.0, -2.0]
     """
     lengths = f"{min(TAPS)} to {max(TAPS)}"
-    if isinstance(register, bool) or not isinstance(register, Integral) or int(register) not in TAPS:
+    if not is_whole(register) or int(register) not in TAPS:
         raise SettingsError(f"register is {register!r}: give a whole number of bits from {lengths}")
-    if isinstance(hold, bool) or not isinstance(hold, Integral) or not 1 <= hold <= LONGEST_HOLD:
+    if not is_whole(hold) or not 1 <= hold <= LONGEST_HOLD:
         raise SettingsError(f"hold is {hold!r}: give a whole number of samples, from 1 to {LONGEST_HOLD}")
     n, samples = int(register), 2 ** int(register) - 1
-    if isinstance(seed, bool) or not isinstance(seed, Integral) or not 1 <= seed <= samples:
+    if not is_whole(seed) or not 1 <= seed <= samples:
         raise SettingsError(f"seed is {seed!r}: give a whole number from 1 to {samples}")
     height = real_number(amplitude, "amplitude", SettingsError, "give a finite number > 0 in rad/s")
     level = real_number(offset, "offset", SettingsError, "give a finite number in rad/s")

@@ -9,6 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from gaident.data.signals.arrays import floats
 from gaident.errors import ModelError
 from gaident.models.roots import quadratic_roots
 
@@ -76,8 +77,8 @@ Of a mean over k samples that is its phase; its size, sin(x)/x with x = k omega 
 def frequencies(omega: ArrayLike) -> NDArray[np.float64]:
     """`omega` [rad/s] as an array; raises ModelError for what is no number and no array of numbers."""
     try:
-        return np.asarray(omega, dtype=np.float64)
-    except (TypeError, ValueError, OverflowError):
+        return floats(omega)
+    except TypeError:
         raise ModelError(f"omega is {omega!r:.80}: give frequencies in rad/s") from None
 
 

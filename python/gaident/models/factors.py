@@ -13,6 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from gaident.data.signals.arrays import floats
 from gaident.errors import ModelError
 from gaident.models.effect_rows import SIDES
 from gaident.models.model import Model
@@ -98,6 +99,8 @@ def factor_parameters(model: Model) -> tuple[tuple[str, ...], NDArray[np.float64
     if not all(hasattr(model, name) for name in ("gain", "poles", "zeros", "p")):
         raise ModelError(f"model is a {type(model).__name__}: give a gaident.Model")
     for kind, roots in (("poles", model.poles), ("zeros", model.zeros)):
+        if not isinstance(roots, Sequence | np.ndarray):
+            raise ModelError(f"{kind} of model is {roots!r:.80}: give a gaident.Model")
         check_sizes(roots, f"{kind} of model")
     names, values, units = ["gain"], [model.gain], [gain_unit(model.p)]
     for kind, roots in (("pole", model.poles), ("zero", model.zeros)):
@@ -145,8 +148,8 @@ def model_from_factor_parameters(values: ArrayLike, structure: FactorCounts) -> 
     """
     structure = _counts(structure)
     try:
-        x = np.asarray(values, dtype=np.float64)
-    except (TypeError, ValueError, OverflowError):
+        x = floats(values)
+    except TypeError:
         raise ModelError(f"values is {values!r:.80}: give {structure.size} numbers, as factor_parameters does") from None
     if x.shape != (structure.size,):
         raise ModelError(f"values has the shape {x.shape}: {structure} takes {structure.size} numbers")

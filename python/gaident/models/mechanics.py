@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 
 from gaident.axis import Text, say, unit_text
 from gaident.checks import LARGEST, known_keys, one_of, real_number, yes_or_no
+from gaident.data.signals.arrays import floats
 from gaident.errors import ModelError
 from gaident.models import two_mass
 from gaident.models.factors import FactorCounts
@@ -374,8 +375,8 @@ def _checked_covariance(model: Model, covariance: ArrayLike | None) -> Matrix | 
         return None
     n = FactorCounts.of(model).size
     try:
-        cov = np.array(covariance, dtype=np.float64)
-    except (TypeError, ValueError, OverflowError):
+        cov = floats(covariance)
+    except TypeError:
         raise ModelError(f"covariance is {covariance!r:.80}: give {n} x {n} numbers, or None") from None
     if cov.shape != (n, n):
         raise ModelError(

@@ -21,6 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gaident.checks import yes_or_no
+from gaident.data.signals.arrays import is_number
 from gaident.errors import ModelError
 from gaident.policy.table import POLICY
 
@@ -237,7 +238,7 @@ def _check_parameter(effect: str, p: Parameter) -> None:
 
 def _is_number(value: object) -> bool:
     """Whether a float64 takes it, infinity and nan too; a bool is none."""
-    if isinstance(value, bool) or not isinstance(value, int | float | np.integer | np.floating):
+    if not is_number(value):
         return False
     try:
         float(value)

@@ -85,7 +85,8 @@ def canonical_roots(roots: object, name: str) -> tuple[complex, ...]:
     if isinstance(roots, (str, bytes)):
         raise ModelError(f"{name} is {roots!r}: give a list of numbers in rad/s")
     try:
-        values = np.atleast_1d(np.asarray(roots, dtype=np.complex128))
+        with np.errstate(over="ignore"):
+            values = np.atleast_1d(np.asarray(roots, dtype=np.complex128))
     except (TypeError, ValueError, OverflowError):
         raise ModelError(f"{name} is {roots!r}: give a list of numbers in rad/s") from None
     if values.ndim != 1:

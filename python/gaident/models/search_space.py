@@ -71,11 +71,14 @@ class SearchSpace:
     def __post_init__(self) -> None:
         for name in ("gain", "real", "imaginary", "p", "q"):
             value = getattr(self, name)
-            if isinstance(value, str) or not isinstance(value, (Sequence, np.ndarray)) or len(value) != 2:
+            pair = isinstance(value, Sequence) or (isinstance(value, np.ndarray) and value.ndim == 1)
+            if isinstance(value, str) or not pair or len(value) != 2:
                 raise SpaceError(f"{name} is {value!r}: give a pair (lowest, highest)")
+            if not all(isinstance(v, Real) for v in value):
+                raise SpaceError(f"{name} is {value!r}: both ends must be numbers")
             try:
                 lo, hi = (float(v) for v in value)
-            except (TypeError, ValueError):
+            except OverflowError:
                 raise SpaceError(f"{name} is {value!r}: both ends must be numbers") from None
             if not (math.isfinite(lo) and math.isfinite(hi)):
                 raise SpaceError(f"{name} is {value!r}: both ends must be finite")
@@ -179,7 +182,7 @@ def _pair(name: str, value: object, above_zero: bool) -> Range:
     """(lowest, highest) as floats, or SpaceError."""
     try:
         lo, hi = (float(v) for v in value)  # type: ignore[attr-defined]
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         raise SpaceError(f"{name} is {value!r}: give a pair of numbers (lowest, highest)") from None
     if not ((lo > 0.0 or (lo == 0.0 and not above_zero)) and lo < hi < math.inf):
         least = "0 <" if above_zero else "0 <="

@@ -13,6 +13,7 @@ from gaident.control import core
 from gaident.control.controller import Controller, checked_controller
 from gaident.control.filtering import rate_limited
 from gaident.data.record import Record
+from gaident.data.signals.arrays import floats
 from gaident.errors import ModelError, RecordError
 from gaident.models.discrete import require_strictly_proper
 from gaident.models.held_torque import held_torque
@@ -77,8 +78,8 @@ MOST_WORKERS = 1024  # no decision: what an argument may be: threads
 def states_of(value: object, name: str) -> Signal:
     """States of a start as an array of its own; raises ModelError for what is no array of numbers."""
     try:
-        return np.array(value, dtype=np.float64)
-    except (TypeError, ValueError, OverflowError):
+        return floats(value)
+    except TypeError:
         raise ModelError(f"{name} is {value!r:.80}: give numbers, as gaident.initial_state does") from None
 
 

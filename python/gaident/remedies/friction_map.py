@@ -22,6 +22,7 @@ from numpy.typing import ArrayLike, NDArray
 from gaident.axis import checked_axis, linear_sentences, said, say, unit
 from gaident.checks import one_of, several, size_of_drive
 from gaident.data.record import Record
+from gaident.data.signals.arrays import floats
 from gaident.errors import RecordError, SettingsError
 from gaident.estimation.regression.inverse_dynamics import inverse_dynamics
 from gaident.estimation.regression.motion import ORDER, Motion, cutoff_of, motion_of
@@ -327,8 +328,8 @@ def _temperatures(given: Any, records: Sequence[Record], alone: bool) -> list[Ve
     found = []
     for rec, part in zip(records, parts, strict=True):
         try:
-            values = np.asarray(np.nan if part is None else part, dtype=np.float64)
-        except (TypeError, ValueError, OverflowError):
+            values = floats(np.nan if part is None else part)
+        except TypeError:
             raise SettingsError(f"temperature is {part!r:.60}: {remedy}") from None
         if np.any(np.abs(values) > HOTTEST):
             raise SettingsError(f"temperature has {np.nanmax(np.abs(values)):g}, which nothing has: {remedy}")

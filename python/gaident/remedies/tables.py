@@ -10,7 +10,6 @@ import re
 import textwrap
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -18,6 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from gaident.axis import called, linear_sentences, said, say, unit
 from gaident.checks import LARGEST, checked_path
+from gaident.data.signals.arrays import floats
 from gaident.errors import SettingsError
 from gaident.export.c_source import c_name
 from gaident.files import write_whole
@@ -36,12 +36,11 @@ def _of_motion(values: ArrayLike, name: str) -> Vector:
     """Numbers of a motion; raises SettingsError naming the argument."""
     remedy = "give real numbers, one or an array of them"
     try:
-        array = np.asarray(values)
-        if array.dtype.kind not in "iuf":  # no decision: a format: whole numbers and others, of numpy
-            raise TypeError(f"dtype {array.dtype}")
-    except (TypeError, ValueError) as reason:
+        array = floats(values)
+        if np.asarray(values).dtype.kind == "b":
+            raise TypeError("true or false")
+    except TypeError as reason:
         raise SettingsError(f"{name} is {values!r:.60} ({reason}): {remedy}") from None
-    array = array.astype(np.float64)
     far = array[~(np.abs(array) <= LARGEST)]  # not a number, too
     if far.size:
         raise SettingsError(f"{name} has {far[0]:g}, which no drive reaches ({LARGEST:g} at most): {remedy}")
@@ -200,9 +199,10 @@ class FeedforwardTables:
         """
         if name is not None and not (isinstance(name, str) and re.fullmatch(r"[A-Za-z_][A-Za-z0-9_]*", name)):
             raise SettingsError(f"name is {name!r:.80}: give what C takes as a name, letters, digits and _")
-        text = c_tables(self, name or c_name("feedforward" if path is None else checked_path(path).stem))
-        if path is not None:
-            write_whole(Path(path), text.encode())
+        target = None if path is None else checked_path(path)
+        text = c_tables(self, name or c_name("feedforward" if target is None else target.stem))
+        if target is not None:
+            write_whole(target, text.encode())
         return text
 
     def to_dict(self) -> dict[str, Any]:

@@ -61,8 +61,8 @@ class Limits:
             if limit.name == "travel" and isinstance(value, float) and value == math.inf:
                 continue
             number = real_number(value, limit.name, SettingsError, "give one number > 0")
-            if not 0.0 < number <= LARGEST:
-                raise SettingsError(f"{limit.name} is {number:g}: give one number > 0, and at most {LARGEST:g}")
+            if not 1.0 / LARGEST <= number <= LARGEST:
+                raise SettingsError(f"{limit.name} is {number:g}: give one number > 0, {1.0 / LARGEST:g} to {LARGEST:g}")
             object.__setattr__(self, limit.name, number)
 
     @classmethod

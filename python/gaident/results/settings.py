@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import asdict, dataclass, fields
-from numbers import Integral
 from typing import TYPE_CHECKING, Any
 
-from gaident.checks import known_keys
+from gaident.checks import is_whole, known_keys
 from gaident.errors import SettingsError
 
 if TYPE_CHECKING:
@@ -105,7 +104,7 @@ class Settings:
             ("quiet_rounds", 1, 10_000_000),
         ):
             value = getattr(self, name)
-            if isinstance(value, bool) or not isinstance(value, Integral):
+            if not is_whole(value):
                 raise SettingsError(f"{name} is {value!r}: it must be a whole number, {low} or more")
             high = top if isinstance(top, int) else self.population - (name == "elites")
             if not low <= int(value) <= high:

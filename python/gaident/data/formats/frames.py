@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import replace
 from typing import Any
 
@@ -14,9 +15,9 @@ from gaident.data.formats.table import Column, LogTable
 __all__ = ["frame_column", "frame_table", "is_frame"]
 
 
-def is_frame(source: object) -> bool:
+def is_frame(source: Any) -> bool:
     """Whether `source` is a DataFrame: pandas' own, or one with its attributes (`columns`, `index`, `iloc`)."""
-    return all(hasattr(source, name) for name in ("columns", "index", "iloc"))
+    return all(hasattr(source, name) for name in ("columns", "index", "iloc")) and isinstance(source.columns, Iterable)
 
 
 def frame_table(frame: Any) -> LogTable:

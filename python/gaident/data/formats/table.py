@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gaident.arguments import arg
+from gaident.checks import is_whole
 from gaident.data.signals.arrays import first_not_finite
 from gaident.errors import ReadError
 
@@ -173,7 +174,7 @@ class LogTable:
 
         Raises ReadError, naming what there is, when none or more than one answers.
         """
-        if isinstance(address, bool) or not isinstance(address, str | int | np.integer):
+        if not (isinstance(address, str) or is_whole(address)):
             raise ReadError(f"columns: {channel}={address!r} is no column; give its name, or its number as '#0'")
         wanted = address.strip() if isinstance(address, str) else f"#{address}"
         # The number comes before loose spellings, but a column may really be called '#1'.

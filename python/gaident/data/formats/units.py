@@ -6,9 +6,8 @@ import difflib
 import math
 from dataclasses import dataclass
 
-import numpy as np
-
 from gaident.arguments import arg
+from gaident.data.signals.arrays import is_number
 from gaident.errors import ReadError
 
 __all__ = ["QUANTITIES", "Constants", "factor", "is_any_unit", "is_unit", "known_units", "needed_constant", "of_other_axis"]
@@ -245,7 +244,7 @@ def needed_constant(quantity: str, unit: str) -> str | None:
 
 def _number(value: object) -> float | None:
     """`value` as a float (too large: infinity), None if it is no number."""
-    if isinstance(value, bool) or not isinstance(value, int | float | np.integer | np.floating):
+    if not is_number(value):
         return None
     try:
         return float(value)

@@ -259,8 +259,9 @@ def _numbers(values: ArrayLike, argument: str, kind: type[Any] = np.float64) -> 
         array = np.asarray(values)
         if array.dtype.kind not in ("iufc" if kind is np.complex128 else "iuf"):
             raise TypeError(f"dtype {array.dtype}")
-        copy = np.array(array, dtype=kind)
-    except (TypeError, ValueError) as reason:
+        with np.errstate(over="ignore"):
+            copy = np.array(array, dtype=kind)
+    except (TypeError, ValueError, MemoryError) as reason:
         what = "complex" if kind is np.complex128 else "real"
         raise RecordError(f"{argument} is {values!r:.60} ({reason}): give {what} numbers, one for each frequency") from None
     if copy.ndim != 1:

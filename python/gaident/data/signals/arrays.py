@@ -4,16 +4,17 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import Any
+from numbers import Real
+from typing import Any, TypeGuard
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from gaident.arguments import arg
-from gaident.checks import LARGEST, LONGEST, SHORTEST
+from gaident.checks import LARGEST, LONGEST, SHORTEST, is_whole
 from gaident.errors import RecordError
 
-__all__ = ["MINIMUM_SAMPLES", "channel", "first_not_finite", "positive_number", "sample_time"]
+__all__ = ["MINIMUM_SAMPLES", "channel", "first_not_finite", "floats", "is_number", "positive_number", "sample_time"]
 
 MINIMUM_SAMPLES = 20  # no decision: what an argument may be: a record has so many samples at least
 """Fewer samples identify nothing."""
@@ -28,6 +29,33 @@ _REFUSED_KINDS = {
     "m": ("a time difference", "give plain numbers"),
     "V": ("structured", "give one of its fields"),
 }
+
+
+def is_number(value: object) -> TypeGuard[float]:
+    """Whether it is a real number of Python or NumPy; a bool is none, nor is a time difference."""
+    return is_whole(value) or isinstance(value, float | np.floating)
+
+
+def floats(values: object) -> NDArray[np.float64]:
+    """A copy of a number or an array as float64, too large ones as infinity.
+
+    Raises TypeError, which says why and no more, for a complex number, of which a part would be dropped, a text, a date, a list
+    that is no array, and one that needs more memory than there is.
+    """
+    try:
+        array = np.asarray(values)
+        if array.dtype.kind not in "biufO":  # no decision: a format: numbers, and objects that may be some
+            raise TypeError(f"dtype {array.dtype}")
+        if array.dtype.kind == "O":
+            for value in array.flat:
+                if not isinstance(value, Real):
+                    raise TypeError(f"{value!r:.40} is no real number")
+        with np.errstate(over="ignore"):
+            return np.array(array, dtype=np.float64)
+    except (TypeError, ValueError, OverflowError) as error:
+        raise TypeError(str(error)) from None
+    except MemoryError:
+        raise TypeError("it is too long") from None
 
 
 def channel(values: ArrayLike, argument: str) -> NDArray[np.float64]:
@@ -79,14 +107,15 @@ def sample_time(value: object, remedy: str | None = None, argument: str = "dt") 
 
 def _as_array(values: ArrayLike, argument: str) -> NDArray[Any]:
     """numpy.asarray with our errors; a list of whole numbers too large for int64 still is one of numbers."""
-    if isinstance(values, np.ma.MaskedArray) and np.ma.getmaskarray(values).any():
+    if isinstance(values, np.ma.MaskedArray) and values.dtype.kind != "V" and np.ma.getmaskarray(values).any():
         bad = int(np.argmax(np.ma.getmaskarray(values).ravel()))
         raise RecordError(f"{argument}[{bad}] is masked, but every value must be there; cut or repair the record")
     try:
         array = np.asarray(values)
-    except (ValueError, TypeError, OverflowError) as error:
+    except (ValueError, TypeError, OverflowError, MemoryError) as error:
         raise RecordError(
-            f"{argument} is no array ({error}); give one number per sample, for example numpy.asarray(x, dtype=float)"
+            f"{argument} is no array ({str(error) or 'it is too long'}); give one number per sample, for example "
+            "numpy.asarray(x, dtype=float)"
         ) from None
     if array.dtype.kind == "O" and array.ndim == 1 and isinstance(values, list | tuple):
         return _from_objects(values, array, argument)
@@ -95,7 +124,7 @@ def _as_array(values: ArrayLike, argument: str) -> NDArray[Any]:
 
 def _from_objects(values: Sequence[Any], array: NDArray[Any], argument: str) -> NDArray[Any]:
     for index, value in enumerate(values):
-        if isinstance(value, bool) or not isinstance(value, int | float | np.integer | np.floating):
+        if not is_number(value):
             raise RecordError(f"{argument}[{index}] = {value!r} is no number; give real numbers only")
     try:
         return array.astype(np.float64)
@@ -113,7 +142,7 @@ def positive_number(value: object, argument: str, unit: str, remedy: str) -> flo
     """`value` as a float > 0 and finite. Raises RecordError naming `argument`, the value and the remedy."""
     if isinstance(value, np.ndarray) and value.ndim == 0:
         value = value[()]
-    if isinstance(value, bool | np.bool_) or not isinstance(value, int | float | np.integer | np.floating):
+    if not is_number(value):
         raise RecordError(f"{arg(argument, repr(value))} is no number; {remedy}")
     try:
         number = float(value)

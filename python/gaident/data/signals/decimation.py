@@ -7,6 +7,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
+from gaident.checks import is_whole
 from gaident.errors import RecordError
 
 __all__ = ["Decimator", "decimated", "factor_of", "low_passed", "means_ahead", "reach"]
@@ -24,7 +25,7 @@ _CORNER = 0.9  # no decision: a formula: a low-pass
 def factor_of(value: object, argument: str = "decimate", form: str = "={!r}") -> int:
     """`value` as a whole number from 1. Raises RecordError, which shows argument and value in this form."""
     # no decision: what an argument may be
-    if isinstance(value, bool) or not isinstance(value, (int, np.integer)) or not 1 <= value <= 100_000:
+    if not is_whole(value) or not 1 <= value <= 100_000:
         raise RecordError(f"{argument}{form.format(value)}: give a whole number from 1 to 100000, of samples that become one")
     return int(value)
 

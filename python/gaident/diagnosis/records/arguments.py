@@ -8,7 +8,7 @@ import numpy as np
 
 from gaident.arguments import NO_CONTROLLER
 from gaident.axis import period_of
-from gaident.checks import above_zero
+from gaident.checks import above_zero, is_whole, real_number
 from gaident.control.pi import PI
 from gaident.data.record import Record
 from gaident.errors import RecordError, SettingsError
@@ -66,7 +66,7 @@ def checked(
     if progress is not None and not callable(progress):
         raise SettingsError(f"progress is {progress!r}: give a function of (fraction, message), or None")
     for name, value, low, high in (("bootstrap", bootstrap, 0, 100_000), ("seed", seed, 0, 2**63 - 1)):
-        if isinstance(value, bool) or not isinstance(value, (int, np.integer)) or not low <= value <= high:
+        if not is_whole(value) or not low <= value <= high:
             raise SettingsError(f"{name} is {value!r}: it must be a whole number from {low} to {high}")
 
 
@@ -90,8 +90,8 @@ def expected_of(expected: Mapping[str, tuple[float, float]] | None) -> dict[str,
         if name not in ("inertia", "resonance_hz", "damping"):
             raise SettingsError(f"expected has {name!r}: {remedy}")
         try:
-            low, high = (float(v) for v in value)
-        except (TypeError, ValueError, OverflowError):
+            low, high = (real_number(v, f"expected {name}", SettingsError, remedy) for v in value)
+        except (TypeError, ValueError):  # of another count; a SettingsError is a ValueError, too
             raise SettingsError(f"expected {name} is {value!r}: {remedy}") from None
         if not 0.0 <= low < high:
             raise SettingsError(f"expected {name} is {value!r}: {remedy}, with 0 <= lowest < highest")

@@ -22,12 +22,12 @@ import math
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any
+from typing import Any, TypeGuard
 
 import numpy as np
 from numpy.typing import NDArray
 
-from gaident.checks import real_number
+from gaident.checks import LONGEST, is_whole, real_number
 from gaident.control.pi import PI
 from gaident.data.record import Record
 from gaident.data.torque_kind import MEAN, MEASURED
@@ -131,25 +131,25 @@ def force_error(
     >>> round(ga.force_error(ga.OneMass(J=2e-3, D=0.01).model(), rec).rms, 2)
     0.1
     """
-    given = [records] if isinstance(records, Record) else list(records) if isinstance(records, Iterable) else []
-    firsts: list[Any] = list(first) if isinstance(first, Iterable) else [first] * len(given)
+    given = [records] if isinstance(records, Record) else list(records) if _has_items(records) else []
+    firsts: list[Any] = list(first) if _has_items(first) else [first] * len(given)
     if not given or not all(isinstance(r, Record) and r.torque is not None for r in given):
         raise RecordError("records: give one Record or several, each with its torque, which the force error compares")
     if len(firsts) != len(given):
         raise SettingsError(f"first has {len(firsts)} numbers for {len(given)} records; give one number, or one for each record")
-    if any(isinstance(n, bool) or not isinstance(n, int | np.integer) or n < 0 for n in firsts):
+    if any(not is_whole(n) or n < 0 for n in firsts):
         raise SettingsError(f"first is {first!r:.80}: give a whole number of samples, 0 or more, or one for each record")
     if not isinstance(model, Model | InverseDynamics) and not callable(model):
         raise SettingsError(f"model is {model!r:.80}: give a Model, what inverse_dynamics found, or a function of a record")
     # no decision: what an argument may be
-    if isinstance(order, bool) or not isinstance(order, int | np.integer) or not 1 <= order <= 10:
+    if not is_whole(order) or not 1 <= order <= 10:
         raise SettingsError(f"order={order!r}: give a whole number from 1 to 10, the filter's order in each direction")
-    # no decision: a formula: the Nyquist frequency
-    remedy = f"give a corner between 0 and {0.5 / given[0].dt:g} Hz, or None"
+    nyquist = 0.5 / given[0].dt  # no decision: a formula
+    remedy = f"give a corner between {1.0 / LONGEST:g} and {nyquist:g} Hz, or None"
     given_hz = None if cutoff_hz is None else real_number(cutoff_hz, "cutoff_hz", SettingsError, remedy)
     cutoff = band_of(model, given, int(order)) if given_hz is None else given_hz
-    if not 0.0 < cutoff < 0.5 / given[0].dt:  # no decision: a formula: the Nyquist frequency
-        raise SettingsError(f"cutoff_hz={cutoff_hz!r}: give a corner between 0 and {0.5 / given[0].dt:g} Hz, or None")
+    if not 1.0 / LONGEST <= cutoff < nyquist:
+        raise SettingsError(f"cutoff_hz={cutoff_hz!r}: {remedy}")
     filtered = FilteredRecords(tuple(given), tuple(firsts), cutoff, int(order))
     return filtered.force_error(model, filtered.torques(model))
 
@@ -228,6 +228,11 @@ def _torques(
     if needed.shape != rec.torque.shape:
         raise SettingsError(f"model gives an array of the shape {needed.shape} for a record of {len(rec)} samples")
     return motion.torque, needed
+
+
+def _has_items(value: object) -> TypeGuard[Iterable[Any]]:
+    """Whether it is several values; an array without a dimension is one, though NumPy gives it an iterator."""
+    return isinstance(value, Iterable) and bool(getattr(value, "ndim", 1))
 
 
 def effects_before_the_shaft(model: Model) -> list[str]:

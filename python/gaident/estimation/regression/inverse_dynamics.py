@@ -9,8 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gaident.axis import TURN, Text, checked_axis, percent, say, turns
-from gaident.checks import real_number
+from gaident.checks import LONGEST, is_whole, real_number
 from gaident.data.record import Record
+from gaident.data.signals.arrays import is_number
 from gaident.errors import RecordError, SettingsError
 from gaident.estimation.criterion import bic, effective_samples
 from gaident.estimation.regression.motion import ORDER, cutoff_of, noise_share
@@ -103,14 +104,15 @@ def inverse_dynamics(
     records = _checked(rec, "rec")
     checked_axis(axis)
     # no decision: what an argument may be
-    if isinstance(order, bool) or not isinstance(order, int | np.integer) or not 1 <= order <= 10:
+    if not is_whole(order) or not 1 <= order <= 10:
         raise SettingsError(f"order={order!r}: give a whole number from 1 to 10, the filter's order in each direction")
     nyquist = 0.5 / records[0].dt  # no decision: a formula: the Nyquist frequency
     cutoff = (
         min(cutoff_of(r, order) for r in records) if cutoff_hz is None else _number(cutoff_hz, "cutoff_hz", "the corner in Hz")
     )
-    if not 0.0 < cutoff < nyquist:
-        raise SettingsError(f"cutoff_hz={cutoff_hz!r}: give a corner between 0 and {nyquist:g} Hz, half the sample rate, or None")
+    if not 1.0 / LONGEST <= cutoff < nyquist:
+        remedy = f"give a corner between {1.0 / LONGEST:g} and {nyquist:g} Hz, half the sample rate, or None"
+        raise SettingsError(f"cutoff_hz={cutoff_hz!r}: {remedy}")
     if standstill is not None and not _number(standstill, "standstill", "a velocity in rad/s") >= 0.0:
         raise SettingsError(f"standstill={standstill!r}: give a velocity from 0 on in rad/s, or None")
     factor = decimation_of(decimation, cutoff, records[0].dt)
@@ -189,7 +191,7 @@ def _checked(rec: Record | Sequence[Record], argument: str) -> list[Record]:
 
 
 def _number(value: object, argument: str, what: str) -> float:
-    if isinstance(value, bool) or not isinstance(value, int | float | np.integer | np.floating):
+    if not is_number(value):
         raise SettingsError(f"{argument}={value!r} is no number; give {what}, or None")
     return real_number(value, argument, SettingsError, f"give {what}, or None")
 

@@ -77,7 +77,7 @@ def low_passed(x: Vector, dt: float, cutoff_hz: float, order: int) -> Vector:
     """x behind the Butterworth filter run forward and backward; a straight line between its ends passes as it is."""
     line = x[0] + (x[-1] - x[0]) / (x.size - 1) * np.arange(x.size)
     # no decision: a formula: a filter settles beyond the ends
-    extension = min(max(15, math.ceil(2.0 / (cutoff_hz * dt))), x.size - 1)
+    extension = min(max(15, math.ceil(min(2.0 / (cutoff_hz * dt), float(x.size)))), x.size - 1)
     low_pass = _sections(order, cutoff_hz * 2.0 * dt)  # no decision: a formula
     return np.asarray(zero_phase(low_pass, (x - line)[None, :], extension)[0] + line)
 

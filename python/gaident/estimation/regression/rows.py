@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from gaident.checks import is_whole
 from gaident.data.record import Record
 from gaident.data.signals.decimation import decimated
 from gaident.errors import SettingsError
@@ -47,13 +48,19 @@ class Rows:
         return replace(self, **kept)
 
 
+MOST = 100_000  # no decision: what an argument may be: samples that become one row
+
+
 def decimation_of(decimation: object, cutoff_hz: float, dt: float) -> int:
     """Samples that become one row: as asked, else 1/(cutoff_hz dt) of them, at least one. Raises SettingsError."""
     if decimation is None:
-        return max(1, int(1.0 / (cutoff_hz * dt) + 1e-6))  # no decision: rounding
-    # no decision: what an argument may be
-    if isinstance(decimation, bool) or not isinstance(decimation, int | np.integer) or not 1 <= decimation <= 100_000:
-        raise SettingsError(f"decimation={decimation!r}: give a whole number of samples from 1 to 100000, or None")
+        factor = max(1, int(1.0 / (cutoff_hz * dt) + 1e-6))  # no decision: rounding
+        if factor > MOST:
+            lowest = f"{1.0 / (MOST * dt):g} Hz or more"
+            raise SettingsError(f"cutoff_hz is {cutoff_hz:g} Hz: more than {MOST} samples become one row; give {lowest}")
+        return factor
+    if not is_whole(decimation) or not 1 <= decimation <= MOST:
+        raise SettingsError(f"decimation={decimation!r}: give a whole number of samples from 1 to {MOST}, or None")
     return int(decimation)
 
 

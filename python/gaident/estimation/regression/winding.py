@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import brentq, minimize_scalar
 
-from gaident.checks import real_number
+from gaident.checks import LONGEST, real_number
 from gaident.data.record import Record
 from gaident.data.signals.arrays import channel
 from gaident.data.signals.decimation import decimated
@@ -171,10 +171,11 @@ def estimate_winding(
 
 
 def _estimated(U: Vector, i: Vector, w: Vector, rec: Record, cutoff_hz: float | None) -> WindingFit:
-    remedy = f"give a corner between 0 and {0.5 / rec.dt:g} Hz, or None"  # no decision: a formula: the Nyquist frequency
+    nyquist = 0.5 / rec.dt  # no decision: a formula
+    remedy = f"give a corner between {1.0 / LONGEST:g} and {nyquist:g} Hz, or None"
     cutoff = cutoff_of(rec, ORDER) if cutoff_hz is None else real_number(cutoff_hz, "cutoff_hz", RecordError, remedy)
-    if not 0.0 < cutoff < 0.5 / rec.dt:  # no decision: a formula: the Nyquist frequency
-        raise RecordError(f"cutoff_hz={cutoff_hz!r}: give a corner between 0 and {0.5 / rec.dt:g} Hz, or None")
+    if not 1.0 / LONGEST <= cutoff < nyquist:
+        raise RecordError(f"cutoff_hz={cutoff_hz!r}: {remedy}")
     factor = decimation_of(None, cutoff, rec.dt)
     repeated = float(np.mean(np.diff(U) == 0.0)) > 0.5  # no decision: a formula: most of them
     rows = _Rows.of([low_passed(x, rec.dt, cutoff, ORDER) for x in (U, i, w)], factor)
@@ -296,8 +297,15 @@ def _settling(rows: _Rows, dt: float) -> _Fitted:
         slope = (R * (over[0] - at[0]) + ke * (over[1] - at[1])) / step
         return covariance([np.column_stack([found.X[:, :2], slope, found.X[:, 2]])], [found.left])
 
+    def beyond(log_step: float) -> float:  # log of the deviation of x that follows, over the step
+        variance = float(spread(math.exp(log_step))[2, 2])
+        return math.log(variance) / 2.0 - log_step if variance > 0.0 else -math.inf
+
     # The slope is that over one deviation of x: at x = 0 the current's part has none, and grows with exp(-1/x).
-    cov = spread(math.exp(brentq(lambda step: math.log(spread(math.exp(step))[2, 2]) / 2.0 - step, *map(math.log, STEPS))))
+    # Without a voltage, or without noise, no step is one; the end that is nearest then says as much.
+    first, last = map(math.log, STEPS)
+    step = brentq(beyond, first, last) if beyond(last) < 0.0 < beyond(first) else first if beyond(first) <= 0.0 else last
+    cov = spread(math.exp(step))
     std = np.sqrt(np.diag(cov))
     deviations = x / float(std[2]) if std[2] > 0.0 else np.inf * x  # of x
     slopes = np.array([x, 0.0, R, 0.0])  # of L/dt = R x
