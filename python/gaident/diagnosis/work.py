@@ -142,7 +142,7 @@ class Work:
             found = selected(objective, self.scales, self.idn.model, *shown, min(most, self.most), beside)
             return by_the_angle(found, self.clean, self._equivalent_here, self._say)
 
-        found, older = searched(self.objective, self.scales, self.idn.model, allowed, search, self.driving.ticks)
+        found, older = searched(self.objective, self.scales, self.idn.model, allowed, search, self.driving.ticks, joint_numbers)
         self.notes += older
         self.not_testable |= unresolved(found.space.data)
         self.note(0.85, "looking for what is left")

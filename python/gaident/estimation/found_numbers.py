@@ -74,8 +74,9 @@ def under_other(data: DataSet, here: Controller, there: Controller, found: Found
     assert data.controller is not None
     pairs = [(_made(r, here), _made(r, there)) for r in data.read or data.records]
     driven = tuple(r.with_channels(torque=torque_in(r) + v - u) for r, (u, v) in zip(data.driven, pairs, strict=True))
-    limited = there.with_limits(*data.controller.limits)
-    return replace(data, controller=limited, driven=driven, free=freed(data.records, driven), found=found)
+    own = zip(data.controller.limits, here.limits, there.limits, strict=True)
+    limits = (new if shown == old and np.isfinite(new) else shown for shown, old, new in own)  # those of the records stay
+    return replace(data, controller=there.with_limits(*limits), driven=driven, free=freed(data.records, driven), found=found)
 
 
 _MADE: MutableMapping[Record, dict[Controller, Vector]] = WeakKeyDictionary()

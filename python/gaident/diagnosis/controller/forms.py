@@ -18,8 +18,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from gaident.control.cascade import Cascade, cascade_of
-from gaident.control.controller import Controller
+from gaident.control.cascade import Cascade
 from gaident.control.found import FoundNumbers
 from gaident.control.pi import PI
 from gaident.data.record import Record
@@ -47,7 +46,7 @@ from gaident.diagnosis.controller.form_comparison import (
     simplest_first,
 )
 from gaident.diagnosis.controller.form_regression import Law, law_of, quiet_law
-from gaident.diagnosis.controller.slow_forms import Limited, follow, limited, run_error, too_fast
+from gaident.diagnosis.controller.slow_forms import follow, limited, run_error, too_fast, with_numbers_of_limit
 from gaident.diagnosis.library.settings import ANTI_WINDUP, OF_SETTING
 from gaident.identification.replay.causes import white_noise
 from gaident.identification.replay.command_timing import timed
@@ -350,6 +349,7 @@ def _with_limit(
     if not after < (min(part, POLICY.each_number) if slow else part) * before or (slow and after > POLICY.replay_noise * size):
         return None
     differs, gains = named(best, numbers, filters, cov, law.period), gains_of(candidates)
+    found = found_of(best, fitted, given, at_limit.controller, law.period, slow)
     if at_limit.limit is not None:
         differs[OF_SETTING["torque_limit"]] = {"limit": (at_limit.limit, at_limit.std)}
         gains[OF_SETTING["torque_limit"]] = at_limit.gain
@@ -370,21 +370,8 @@ def _with_limit(
         rms=after,
         starts=0.0,
         estimated=_estimated(best, numbers, cov),
-        found=_with_time(found_of(best, fitted, given, at_limit.controller, law.period, slow), at_limit if slow else None),
+        found=with_numbers_of_limit(found, at_limit, records) if slow else found,
     )
-
-
-def _with_time(found: FoundNumbers, limit: Limited | None) -> FoundNumbers:
-    """The numbers with the tracking time of a slower log's anti-windup, which what it lost between its lines moves, too."""
-    time = None if limit is None else limit.controller.velocity.tracking_time
-    if limit is None or time is None or not 0.0 < limit.time_std < np.inf:
-        return found
-
-    def tracked(controller: Controller, time: float) -> Cascade:
-        cascade = cascade_of(controller)
-        return replace(cascade, velocity=replace(cascade.velocity, tracking_time=time))
-
-    return found.with_number((ANTI_WINDUP, "tracking_time"), time, limit.time_std, tracked)
 
 
 def _estimated(best: FormCandidate, numbers: Vector, cov: Matrix) -> dict[str, tuple[float, float]]:

@@ -61,10 +61,12 @@ def better_under(found: Selection, controller: Controller, numbers: FoundNumbers
     return here.score(fit) < space.score(final) - space.margin
 
 
-def joint_numbers(found: Selection, compared: Callable[[Selection, Fit], Selection]) -> Selection | None:
+def joint_numbers(
+    found: Selection, compared: Callable[[Selection, Fit], Selection] = lambda found, final: found
+) -> Selection | None:
     """What was selected, with the numbers of the controller where model and torque have them; None where that gains nothing.
 
-    compared: a selection with another model in the place of its own, and its rivals.
+    compared: a selection with another model in the place of its own, and its rivals; else there are no rivals.
     """
     data = found.final.predictor.data.found
     if data is None or not len(data.directions):

@@ -13,17 +13,29 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from gaident.control.cascade import Cascade
+from gaident.control.cascade import Cascade, cascade_of
+from gaident.control.controller import Controller
 from gaident.control.filters import Notch
+from gaident.control.found import FoundNumbers
 from gaident.data.record import Record
 from gaident.data.signals.lattice import rounding_step
 from gaident.diagnosis.controller.form_filters import equation_of
+from gaident.diagnosis.library.settings import ANTI_WINDUP, OF_SETTING
 from gaident.identification.logged_stretches import centred, log_of, numbered, plateau_of, unlimited, whitened
 from gaident.identification.logged_torque import comparable, not_followed
 from gaident.models.starts import starts_moving
 from gaident.policy.table import POLICY
 
-__all__ = ["Limited", "follow", "limited", "run_error", "time_std", "too_fast", "torque_spread"]
+__all__ = [
+    "Limited",
+    "follow",
+    "limited",
+    "run_error",
+    "time_std",
+    "too_fast",
+    "torque_spread",
+    "with_numbers_of_limit",
+]
 
 Vector = NDArray[np.float64]
 
@@ -130,6 +142,33 @@ def _before_filters_of_a_slow_log(records: Sequence[Record], controller: Cascade
 
     bounds = POLICY.limit_apart * plateau, plateau / POLICY.limit_apart
     return float(minimize_scalar(off, bounds=bounds, method="bounded", options={"xatol": LIMIT_EXACT * plateau}).x)
+
+
+def with_numbers_of_limit(found: FoundNumbers, limit: Limited, records: Sequence[Record]) -> FoundNumbers:
+    """The numbers with those at the limit of a slower log that what it lost between its lines moves, too.
+
+    These are a limit before a filter, whose deviation contains what the others of the numbers move it by, and the tracking time.
+    """
+    velocity = limit.controller.velocity
+    if limit.limit is not None and limit.controller.torque_filters:
+        moved = [found.moved(by).controller for by in found.directions]
+        others = [_before_filters_of_a_slow_log(records, cascade_of(c), limit.limit) for c in moved if c is not None]
+        std = float(np.linalg.norm([limit.std, *(other - limit.limit for other in others)]))
+        found = found.with_number((OF_SETTING["torque_limit"], "limit"), limit.limit, std, _with_limit)
+    if velocity.tracking_time is not None and 0.0 < limit.time_std < np.inf:
+        found = found.with_number((ANTI_WINDUP, "tracking_time"), velocity.tracking_time, limit.time_std, _tracked)
+    return found
+
+
+def _with_limit(controller: Controller, limit: float) -> Cascade:
+    cascade = cascade_of(controller)
+    torque, integrator = cascade.limits
+    return cascade.with_limits(limit, limit if integrator == torque else integrator)  # both may be clamped alike
+
+
+def _tracked(controller: Controller, time: float) -> Cascade:
+    cascade = cascade_of(controller)
+    return replace(cascade, velocity=replace(cascade.velocity, tracking_time=time))
 
 
 def _by_windup(records: Sequence[Record], given: Cascade, best: Cascade) -> float:

@@ -17,6 +17,7 @@ from weakref import WeakKeyDictionary
 import numpy as np
 from numpy.typing import NDArray
 
+from gaident.control.cascade import cascade_of
 from gaident.diagnosis.library.equivalences import equivalents
 from gaident.diagnosis.library.sides import called_of
 from gaident.diagnosis.library.terms import LIBRARY
@@ -152,6 +153,12 @@ class ModelSpace(NoiseLevel):
         if fuller.parameters.on_a_spring and not (simpler.parameters.on_a_spring or self.beyond_simulation(simpler, fuller)):
             return False
         return self.material(simpler, fuller) and self.beyond_torque_noise(simpler, fuller)
+
+    def jumps(self, fit: Fit) -> bool:
+        """Whether the cost jumps with the parameters: an impact more, or a sample more at a limit that holds the integrator."""
+        controller = self.data.controller
+        holds = controller is not None and cascade_of(controller).velocity.anti_windup == "hold"
+        return fit.impacts or (fit.predictor.closed and holds)
 
     def rank(self, fit: Fit) -> tuple[bool, bool, float]:
         """Of ends of a search, the lower the better: a model that diverges is last, before it two masses that are on no shaft."""

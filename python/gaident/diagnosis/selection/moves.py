@@ -291,7 +291,7 @@ class Moves(Repeated, WaveMoves):
         return [*(self.without(fit, e) for e in fit.effects), *self.fewer_waves(fit)]
 
     def without(self, fit: Fit, effect: str) -> Fit:
-        """The model refitted without one of its effects; beside stops and impacts after a search of its own.
+        """The model refitted without one of its effects; where the cost jumps, after a search of its own.
 
         Effects that depended on its torque become the simplest effect that they contain.
         """
@@ -299,7 +299,7 @@ class Moves(Repeated, WaveMoves):
         for term in [t for t in hypothesis.parameters.terms if not t.stands_with(hypothesis.effects)]:
             hypothesis, x = _nested(hypothesis, x, term, LIBRARY[term.nested[0]])
         less = self.continued(hypothesis, fit, x)
-        if less.impacts and self.data.fits_in_loop and not self.quiet(less):
+        if self.jumps(less) and self.data.fits_in_loop and not self.quiet(less):
             less = min((less, self.evolved(less)), key=lambda f: f.bic)
         return less
 

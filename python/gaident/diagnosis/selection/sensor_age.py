@@ -83,6 +83,7 @@ def searched(
     allowed: Sequence[Term],
     search: Callable[[Objective, int, Fit | None], Selection],
     ticks: int = 0,
+    joint: Callable[[Selection], Selection | None] = lambda found: None,
 ) -> tuple[Selection, list[Text]]:
     """What a search selects over records whose velocity is as old as they show, with a note on that.
 
@@ -90,6 +91,7 @@ def searched(
     search: of these records, with at most so many effects; what it ends with is compared with a model that is given.
     ticks: samples to a line of a controller that is not simulated, while the torque that was measured on the lines drives the
     model: the mean over a line of what is measured at its begin comes half a line late, a differenced velocity half a sample.
+    joint: a selection with the numbers of the controller, which its torque showed, where the model has them; None: as they are.
     """
     most = POLICY.most_effects
     data = objective.data
@@ -138,7 +140,7 @@ def searched(
             "finding."
         )
         found = search(older, most, None)
-        younger = _no_difference(found, objective, lambda start: search(objective, most, start))
+        younger = _no_difference(found, objective, lambda start: search(objective, most, start), joint)
         if younger is not None:
             return younger, [say(NO_DIFFERENCE, lines, each, age)]
         return found, [say(text, lines, each, age)]
@@ -192,14 +194,21 @@ def _better(again: Selection, found: Selection, margin: float) -> bool:
     return more <= 0 and _score_beside(again, found) < found.space.score(found.final) - margin
 
 
-def _no_difference(found: Selection, younger: Objective, search: Callable[[Fit], Selection]) -> Selection | None:
-    """What a search with the age of 0 ends with, where the model that was found speaks for that age; else None."""
-    closest, gain = _of_other_age(found, younger, ())
-    if gain < (POLICY.rival_margin if len(closest.effects) == len(found.final.effects) else 0.0):
+def _no_difference(
+    found: Selection, younger: Objective, search: Callable[[Fit], Selection], joint: Callable[[Selection], Selection | None]
+) -> Selection | None:
+    """What a search with the age of 0 ends with, where the model that was found speaks for that age; else None.
+
+    Numbers of the controller that the torque showed are a little off, which an age may make up for: they are moved first.
+    """
+    moved = joint(found) or found
+    data = moved.space.data.aged(younger.data.age, younger.data.other_ages)
+    closest, gain = _of_other_age(moved, replace(younger, data=data), ())
+    if gain < (POLICY.rival_margin if len(closest.effects) == len(moved.final.effects) else 0.0):
         return None
     again = search(closest)
     more = _in_series(again.final) - _in_series(closest)
-    return again if more <= 0 and _better(again, found, POLICY.rival_margin) else None
+    return again if more <= 0 and _better(joint(again) or again, moved, POLICY.rival_margin) else None
 
 
 def _in_series(fit: Fit) -> int:
