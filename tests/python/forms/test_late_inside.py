@@ -22,6 +22,7 @@ from gaident.estimation.objective import Fit, Hypothesis, Innovations, Objective
 from gaident.estimation.parameterisation import Parameterisation
 from gaident.estimation.prediction import ClosedLoop
 from gaident.models.drive_torque import driven_by
+from loop_cases import INDUSTRY_BITS, industrial_case
 
 EVERY, PERIOD, LAG, INSIDE = 4, 2.5e-4, 4.8e-4, 6.7e-4
 GAINS, AXIS = ga.PI(kp=0.06, ki=1.2), ga.OneMass(J=4.6e-4, D=1e-3).model()
@@ -56,6 +57,19 @@ def test_a_filter_that_was_not_given_is_what_the_loop_needs_more(effect: str) ->
     (note,) = late_inside(*fitted(ga.Cascade(GAINS, PERIOD), effect))
     inside = float(note.split("So about ")[1].split(" ms")[0])
     assert 0.7e3 * INSIDE < inside < 1.1e3 * INSIDE, "the loop makes up for a part of it by inertia and friction"
+
+
+def test_an_axis_that_swings_between_the_lines_is_not_late_inside() -> None:
+    """A shaft of 250 Hz, a line each millisecond: under the logged torque it is 0.15 ms less late than in its loop."""
+    rec, _, whole, truth = industrial_case("bare", 8, "coulomb_friction", 3071000, INDUSTRY_BITS, True)
+    plant, term = truth.plant, LIBRARY["torque_lag"]
+    axis = ga.TwoMass(JM=plant.J, DM=plant.D, JL=plant.JL, DL=plant.DL, KG=plant.KG, DG=plant.DG).model()
+    data = DataSet.of([driven_by(rec, whole)], whole, read=[rec]).aged(0.5 / 8)
+    objective = Objective(data, np.ones(len(rec))).under(Innovations())
+    parameters = Parameterisation.of(axis, scales_of(data), data.moving)
+    x = np.concatenate([parameters.start(axis), term.coordinates(truth.effects["torque_lag"])])
+    fit = ls.fit(objective, Hypothesis(parameters.extended(term), ClosedLoop(data)), x, WHITE, 30)
+    assert late_inside(objective, ls.reestimated(objective, fit)) == []
 
 
 def test_it_is_asked_only_in_the_loop_of_a_slow_log_with_a_torque() -> None:
