@@ -21,7 +21,7 @@ class ControllerRanges:
     )
     filter_slowest: float = loop(1e5, "periods", "the same at most: 100 s at 1 kHz, beyond which it is an integrator", NUMBERS)
     limit_apart: float = loop(
-        0.8, "1", "of the torque's plateau behind a filter, the limit before it at least, and the plateau of that limit", FORMS
+        0.8, "1", "of the highest torque behind a filter, the limit before it at least, and that torque of the limit", FORMS
     )
     notch_slowest: float = loop(
         1e-4, "1", "of the controller's sampling frequency, the lowest of a notch: 0.1 Hz at 1 kHz", NUMBERS

@@ -8,6 +8,7 @@ import pytest
 import gaident as ga
 from gaident.control.cascade import cascade_of
 from gaident.diagnosis.controller.forms import form_shown
+from gaident.diagnosis.controller.slow_forms import torque_spread
 from loop_cases import INDUSTRY_BITS, industrial_case
 
 
@@ -45,9 +46,9 @@ def test_a_limit_before_a_filter_is_as_unsure_as_the_filter() -> None:
     shown = form_shown([rec], ga.PI(truth.plant.kp, truth.plant.ki), every=4)
     limit = whole.velocity.torque_limit
     assert shown is not None and limit is not None
-    value, alone = shown.numbers["torque_saturation"]["limit"]
+    value, std = shown.numbers["torque_saturation"]["limit"]
     spread = shown.found.covariance
-    assert spread is not None and shown.found.at[-1] == value
-    assert abs(value - limit) < 2.0 * np.sqrt(spread[-1, -1]) and np.sqrt(spread[-1, -1]) > alone
+    assert spread is not None and shown.found.at[-1] == value and std == np.sqrt(spread[-1, -1])
+    assert abs(value - limit) < 2.0 * std and std > torque_spread([rec], value)
     other = shown.found.moved(np.append(np.zeros(len(spread) - 1), 0.1)).controller
     assert other is not None and cascade_of(other).velocity.torque_limit == value + 0.1

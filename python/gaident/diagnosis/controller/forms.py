@@ -361,6 +361,10 @@ def _with_limit(
         time = at_limit.controller.velocity.tracking_time
         differs[ANTI_WINDUP] = {} if time is None else {"tracking_time": (time, at_limit.time_std)}
         gains[ANTI_WINDUP] = at_limit.windup
+    if slow:
+        found = with_numbers_of_limit(found, at_limit, records)
+        said = found.named(found.at, found.covariance) if found.named and found.covariance is not None else {}
+        differs |= {name: dict(said[name]) for name in differs if name in said}
     return Shown(
         controller=at_limit.controller,
         numbers=differs,
@@ -370,7 +374,7 @@ def _with_limit(
         rms=after,
         starts=0.0,
         estimated=_estimated(best, numbers, cov),
-        found=with_numbers_of_limit(found, at_limit, records) if slow else found,
+        found=found,
     )
 
 

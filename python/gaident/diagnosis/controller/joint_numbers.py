@@ -43,7 +43,8 @@ class _Joint:
         """The model with these numbers, without the effects that then are needed no more."""
         best = self.fitted(fit)
         while best.effects:
-            shorter = min((self.fitted(self.space.without(best, e)) for e in best.effects), key=self.score)
+            here = replace(self.space, objective=replace(self.space.objective, data=best.predictor.data))
+            shorter = min((self.fitted(here.without(best, e)) for e in best.effects), key=self.score)
             if self.score(shorter) >= self.score(best):
                 break
             best = shorter
@@ -72,7 +73,7 @@ def joint_numbers(
     if data is None or not len(data.directions):
         return None
     joint = _Joint(found.space)
-    best = joint.best(found.final)
+    best = found.space.objective.once(("joint numbers", found.final.key, found.space.allowed), lambda: joint.best(found.final))
     if not joint.score(best) < found.space.score(found.final) - found.space.policy.swap:
         return None
     moved = best.predictor.data

@@ -21,7 +21,7 @@ from gaident.data.record import Record
 from gaident.data.signals.lattice import rounding_step
 from gaident.diagnosis.controller.form_filters import equation_of
 from gaident.diagnosis.library.settings import ANTI_WINDUP, OF_SETTING
-from gaident.identification.logged_stretches import centred, log_of, numbered, plateau_of, unlimited, whitened
+from gaident.identification.logged_stretches import Log, centred, log_of, numbered, plateau_of, unlimited, whitened
 from gaident.identification.logged_torque import comparable, not_followed
 from gaident.models.starts import starts_moving
 from gaident.policy.table import POLICY
@@ -42,7 +42,9 @@ Vector = NDArray[np.float64]
 SUM_ROUNDING = 1e-9  # no decision: of a torque, what a sum is exact to
 LIMIT_EXACT = 1e-6  # no decision: of a solver: where its search ends, of a plateau
 TIME_EXACT = 1e-10  # no decision: of a solver: where its search ends, of the logarithm of a time
+LIMITS, LIMIT_STEP = 6, 0.01  # no decision: a start; limits from which the closest is searched, of its logarithm
 TIMES = np.geomspace(0.3e-3, 0.3, POLICY.tracking_times)  # no decision: a start; s
+UNTIMED = 3  # no decision: a formula: how many schemes have no time
 NEXT_TIME = float(TIMES[1] / TIMES[0])
 
 
@@ -72,7 +74,7 @@ def run_error(records: Sequence[Record], controller: Cascade, late: int = 0) -> 
     """
     whole = [replace(log_of(r, len(r), controller, True), late=late) for r in records]
     if not any(log.moving for log in whole):
-        return float(np.sqrt(np.mean(np.concatenate([log.torque - log.made(controller) for log in whole]) ** 2)))
+        return _left(whole, controller)
     free = replace(controller, velocity=unlimited(controller.velocity))
     cut = [replace(log_of(r, len(r), controller, False), late=late) for r in records]
     off, stretch = np.concatenate([log.torque - log.made(free) for log in cut]), numbered([log.stretch for log in cut])
@@ -81,6 +83,16 @@ def run_error(records: Sequence[Record], controller: Cascade, late: int = 0) -> 
     if controller.velocity.torque_limit is not None:
         at_limit = 0.0 * at_limit
     return float(np.sqrt(np.mean(np.concatenate([between, at_limit]) ** 2)))
+
+
+def _left(logs: Sequence[Log], controller: Cascade) -> float:
+    return float(np.sqrt(np.mean(np.concatenate([log.torque - log.made(controller) for log in logs]) ** 2)))
+
+
+def _from_rest(records: Sequence[Record], controller: Cascade) -> Callable[[Cascade], float]:
+    """`run_error` of records from rest, of controllers with the clock of this one; velocities between the lines are made once."""
+    logs = [log_of(r, len(r), controller, True) for r in records]
+    return lambda one: _left(logs, one)
 
 
 def follow(records: Sequence[Record], controller: Cascade) -> bool:
@@ -116,32 +128,81 @@ def limited(records: Sequence[Record], controller: Cascade) -> Limited:
     torques = [(r.torque, r.dt) for r in records if r.torque is not None]
     parts = [np.abs(torque if slow else before_filters(torque, controller, dt)) for torque, dt in torques]
     limit = plateau_of(np.concatenate(parts))
-    if slow and controller.torque_filters and np.isfinite(limit):
-        limit = _before_filters_of_a_slow_log(records, controller, limit)
+    if slow and controller.torque_filters and not in_motion:
+        return _limited_before_filters(records, controller, float(np.concatenate(parts).max()), bool(np.isfinite(limit)))
     if not np.isfinite(limit) or not limit > 0.0:
         return Limited(controller, None, 0.0)
     if in_motion:
         known = replace(controller, velocity=replace(controller.velocity, torque_limit=limit))
         return Limited(known, limit, _gain(records, controller, known), torque_spread(records, limit))
-    best = _closest(records, controller, limit)
+    return _at_limit(records, controller, _closest(records, controller, limit), limit)
+
+
+def _at_limit(records: Sequence[Record], controller: Cascade, best: Cascade, limit: float) -> Limited:
+    """What a controller at this limit gains over the one without."""
     same = replace(controller, velocity=replace(controller.velocity, torque_limit=limit))
     windup, gain = _by_windup(records, same, best), _gain(records, controller, best)
     return Limited(best, limit, gain, torque_spread(records, limit), windup, _time_std(records, best) if windup > 0.0 else 0.0)
 
 
-def _before_filters_of_a_slow_log(records: Sequence[Record], controller: Cascade, plateau: float) -> float:
-    """The limit [N m] at the torque filters' input with which the controller comes closest to the logged torque.
+def _limited_before_filters(records: Sequence[Record], controller: Cascade, highest: float, plateau: bool) -> Limited:
+    """The same of a slower log whose torque is behind filters: the limit and the anti-windup are searched together.
 
-    plateau: of the logged torque, which is behind the filters: it may overshoot the limit, or not have come up to it.
+    highest: of the logged torques [N m], which may overshoot the limit or stay below it. plateau: whether they have one.
+    Where a filter leaves none, as a notch rings at the limit, the whole torque has to follow: a limit also keeps the run of a
+    controller that is not the drive's from growing.
     """
+    best = _closest_of_all(records, controller, highest)
+    limit = best.velocity.torque_limit
+    if limit is None or (not plateau and not follow(records, best)):
+        return Limited(controller, None, 0.0)
+    return _at_limit(records, controller, best, limit)
+
+
+def _closest_of_all(records: Sequence[Record], controller: Cascade, highest: float) -> Cascade:
+    """The controller with the limit and the anti-windup, and its time, with which its torque comes closest to the logged one.
+
+    Another anti-windup than none, and one that has a time, takes the share away that a number has to.
+    """
+    from scipy.optimize import minimize
+
+    off = _from_rest(records, controller)
+    near = [min((_with_limit(one, x) for x in _limits(highest)), key=off) for one in _schemes(controller, highest)]
+    winding_up, untimed, timed = near[0], min(near[1:UNTIMED], key=off), min(near[UNTIMED:], key=off)
+    time, limit = timed.velocity.tracking_time, timed.velocity.torque_limit
+    assert time is not None and limit is not None
+    start = np.log([limit, time])
+
+    def at(x: Vector) -> Cascade:
+        return _tracked(_with_limit(timed, float(np.exp(x[0]))), float(np.exp(x[1])))
+
+    corners = np.vstack([start, start + np.diag([LIMIT_STEP, np.log(NEXT_TIME)])])
+    options = {"initial_simplex": corners, "xatol": LIMIT_EXACT, "fatol": SUM_ROUNDING * highest}
+    bounds = [tuple(np.log([some[0], some[-1]])) for some in (_limits(highest), TIMES)]
+    found = at(minimize(lambda x: off(at(x)), start, method="Nelder-Mead", bounds=bounds, options=options).x)
+    best = _closest_limit(records, winding_up, highest)
+    for other in (_closest_limit(records, untimed, highest), found):
+        best = other if off(other) < POLICY.each_number * off(best) else best
+    return best
+
+
+def _limits(highest: float) -> Vector:
+    return np.asarray(highest * np.geomspace(POLICY.limit_apart, 1.0 / POLICY.limit_apart, LIMITS))
+
+
+def _closest_limit(records: Sequence[Record], controller: Cascade, highest: float) -> Cascade:
+    """The controller with the limit at its torque filters' input with which it comes closest to the logged torque."""
     from scipy.optimize import minimize_scalar
 
-    def off(limit: float) -> float:
-        pi = replace(controller.velocity.winding_up, torque_limit=limit)
-        return run_error(records, replace(controller, velocity=pi))
+    left, grid = _from_rest(records, controller), _limits(highest)
 
-    bounds = POLICY.limit_apart * plateau, plateau / POLICY.limit_apart
-    return float(minimize_scalar(off, bounds=bounds, method="bounded", options={"xatol": LIMIT_EXACT * plateau}).x)
+    def off(limit: float) -> float:
+        return left(_with_limit(controller, limit))
+
+    k = int(np.clip(np.argmin([off(limit) for limit in grid]), 1, LIMITS - 2))
+    bounds = grid[k - 1], grid[k + 1]
+    found = minimize_scalar(off, bounds=bounds, method="bounded", options={"xatol": LIMIT_EXACT * highest})
+    return _with_limit(controller, float(found.x))
 
 
 def with_numbers_of_limit(found: FoundNumbers, limit: Limited, records: Sequence[Record]) -> FoundNumbers:
@@ -150,9 +211,10 @@ def with_numbers_of_limit(found: FoundNumbers, limit: Limited, records: Sequence
     These are a limit before a filter, whose deviation contains what the others of the numbers move it by, and the tracking time.
     """
     velocity = limit.controller.velocity
-    if limit.limit is not None and limit.controller.torque_filters:
-        moved = [found.moved(by).controller for by in found.directions]
-        others = [_before_filters_of_a_slow_log(records, cascade_of(c), limit.limit) for c in moved if c is not None]
+    in_motion = any(starts_moving(r, None) for r in records)  # no run shows the limit then
+    if limit.limit is not None and limit.controller.torque_filters and velocity.integrator_limit is None and not in_motion:
+        moved = [c for by in found.directions if (c := found.moved(by).controller) is not None]
+        others = [_closest_limit(records, cascade_of(c), limit.limit).limits[0] for c in moved]
         std = float(np.linalg.norm([limit.std, *(other - limit.limit for other in others)]))
         found = found.with_number((OF_SETTING["torque_limit"], "limit"), limit.limit, std, _with_limit)
     if velocity.tracking_time is not None and 0.0 < limit.time_std < np.inf:
@@ -163,7 +225,7 @@ def with_numbers_of_limit(found: FoundNumbers, limit: Limited, records: Sequence
 def _with_limit(controller: Controller, limit: float) -> Cascade:
     cascade = cascade_of(controller)
     torque, integrator = cascade.limits
-    return cascade.with_limits(limit, limit if integrator == torque else integrator)  # both may be clamped alike
+    return cascade.with_limits(limit, limit if integrator == torque < np.inf else integrator)  # both may be clamped alike
 
 
 def _tracked(controller: Controller, time: float) -> Cascade:
@@ -260,6 +322,7 @@ def before_filters(torque: Vector, controller: Cascade, period: float) -> Vector
 
 
 def _schemes(controller: Cascade, limit: float) -> Iterator[Cascade]:
+    """The anti-windups at this limit, none first, those with a time from number `UNTIMED` on."""
     pi = replace(controller.velocity.winding_up, torque_limit=limit)
     yield replace(controller, velocity=pi)
     yield replace(controller, velocity=replace(pi, integrator_limit=limit))  # both are clamped alike, as SimpleFOC does

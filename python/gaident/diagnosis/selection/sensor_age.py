@@ -45,6 +45,7 @@ from gaident.diagnosis.selection.select import Selection
 from gaident.diagnosis.selection.torque_ahead import ahead_of_line, closer
 from gaident.estimation import least_squares as ls
 from gaident.estimation.dataset import DataSet
+from gaident.estimation.found_numbers import worth
 from gaident.estimation.noise_model import WHITE
 from gaident.estimation.objective import Fit, Hypothesis, Innovations, Objective
 from gaident.estimation.regression.torque_lag import TorqueLag
@@ -207,8 +208,10 @@ def _no_difference(
     if gain < (POLICY.rival_margin if len(closest.effects) == len(moved.final.effects) else 0.0):
         return None
     again = search(closest)
-    more = _in_series(again.final) - _in_series(closest)
-    return again if more <= 0 and _better(joint(again) or again, moved, POLICY.rival_margin) else None
+    other = joint(again) or again
+    more = _in_series(other.final) - _in_series(closest)
+    price = worth(other.space.objective, other.final) - worth(moved.space.objective, moved.final)
+    return again if more <= 0 and _better(other, moved, POLICY.rival_margin + price) else None
 
 
 def _in_series(fit: Fit) -> int:
