@@ -39,10 +39,11 @@ from gaident.diagnosis.inertia_and_angle import inertia_rests_on
 from gaident.diagnosis.library.terms import LIBRARY, level_of
 from gaident.errors import GaidentError
 from gaident.estimation.dataset import DataSet
-from gaident.estimation.regression.force_error import FilteredRecords, ForceError, band_of, effects_before_the_shaft
+from gaident.estimation.regression.force_error import FilteredRecords, ForceError, band_of, effects_before_the_shaft, in_pieces
 from gaident.estimation.regression.inverse_dynamics import inverse_dynamics
 from gaident.estimation.term import Term
 from gaident.models.model import Model
+from gaident.models.own_effects import OWN
 from gaident.models.simulate import run
 from gaident.policy.table import POLICY
 from gaident.results.estimate import Estimate
@@ -135,11 +136,14 @@ def _forces(
 
     All over the same samples of the held-out data, through the same filter.
     """
-    scored = [(r, first) for r, first in gains.scored if r.torque is not None]
-    if len(scored) < len(gains.scored):
+    given = [(r, first) for r, first in gains.scored if r.torque is not None]
+    scored = given
+    if len(given) < len(gains.scored):
         return gains.before, gains.after, None, False
+    if not any(e.name in OWN or LIBRARY[e.name].later is not None for e in gains.extended.effects):  # none knows the time
+        scored = [piece for r, first in scored for piece in in_pieces(r, first)]
     rows, firsts = [r for r, _ in scored], [first for _, first in scored]
-    filtered = FilteredRecords(tuple(rows), tuple(firsts), band_of(gains.extended, rows))
+    filtered = FilteredRecords(tuple(rows), tuple(firsts), band_of(gains.extended, [r for r, _ in given]))
 
     def of(model: Model | InverseDynamics) -> tuple[ForceError, list[Vector]] | None:
         try:
@@ -159,8 +163,9 @@ def _forces(
     if found is not None:
         try:
             fitted = found
-            if any(firsts):  # not of what is held out
-                part = [r[:first] for r, first in scored]
+            if any(first for _, first in given):  # not of what is held out
+                part = [piece for r, first in given for piece, _ in in_pieces(r[:first], 0)]
+                part = part[:: max(len(part) // max(len(given), POLICY.windows), 1)]
                 fitted = inverse_dynamics(part, terms=found.terms, cutoff_hz=found.cutoff_hz, axis=found.axis)
             second = of(fitted)
         except GaidentError:

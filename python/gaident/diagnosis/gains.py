@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -47,6 +48,8 @@ __all__ = [
 Vector = NDArray[np.float64]
 
 STATE_STEP = 1e-3  # no decision: the step of a difference, of the largest velocity
+MOST_BLOCKS = 1 << 14  # no decision: a block in memory: longer ones only hold more of what is correlated
+TOGETHER = 1 << 20  # no decision: a block in memory
 NOISES = 8  # no decision: draws of a torque's noise, how closely the floor of a free run is known
 
 
@@ -211,10 +214,11 @@ def _part(objective: Objective, part: tuple[int, ...] | None) -> Objective:
     if part is None:
         return objective
     weight = objective.weight.copy()
+    places = objective.data.places or [(i, 0, n) for i, n in enumerate(objective.lengths)]
     at = 0
-    for n, first in zip(objective.lengths, part, strict=True):
-        weight[at + first : at + n] = 0.0
-        at += n
+    for i, start, stop in places:
+        weight[at + max(part[i] - start, 0) : at + stop - start] = 0.0
+        at += stop - start
     return objective.weighted(weight)
 
 
@@ -324,11 +328,16 @@ def interval_of_fall(before: list[Vector], after: list[Vector]) -> tuple[float, 
     b, a = np.concatenate(before), np.concatenate(after)
     n = len(b)
     memory = n / effective_samples(a)
-    block = max(min(n // POLICY.least_blocks, round(POLICY.block_memory * memory)), 1)
+    block = max(
+        min(n // POLICY.least_blocks, round(POLICY.block_memory * memory)),
+        n // MOST_BLOCKS if n > POLICY.whole_samples else 1,
+    )
     count = n // block
     if count < 2:
         return (float("-inf"), 1.0)
-    sums = np.add.reduceat(np.column_stack([b**2, a**2])[: count * block], np.arange(0, count * block, block), axis=0)
+    ends = [*range(0, count * block, max(TOGETHER // block, 1) * block), count * block]
+    parts = (np.column_stack([b[i:j] ** 2, a[i:j] ** 2]) for i, j in pairwise(ends))
+    sums = np.vstack([np.add.reduceat(part, np.arange(0, len(part), block), axis=0) for part in parts])
     rng = np.random.default_rng(0)
     drawn = sums[rng.integers(0, count, (POLICY.draws, count))].sum(axis=1)
     falls = 1.0 - np.sqrt(drawn[:, 1] / np.maximum(drawn[:, 0], 1e-300))

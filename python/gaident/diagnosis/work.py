@@ -14,7 +14,7 @@ from gaident.data.record import Record
 from gaident.diagnosis.at_the_load import explains_load, load_numbers, load_words, with_load_sensor
 from gaident.diagnosis.check import checked as by_second_method
 from gaident.diagnosis.controller.as_read import as_read
-from gaident.diagnosis.controller.controller_place import controller_findings
+from gaident.diagnosis.controller.controller_place import controller_findings, under_shown
 from gaident.diagnosis.controller.driving import Driving
 from gaident.diagnosis.controller.joint_numbers import joint_numbers
 from gaident.diagnosis.experiments.candidates import candidates, loop_notes, unresolved
@@ -22,9 +22,10 @@ from gaident.diagnosis.experiments.excitation import excitation
 from gaident.diagnosis.explain.alternatives import LOG_SHIFT, alike_here, alternatives_of, impossible_here, integrator_start
 from gaident.diagnosis.explain.bending import relevance_of
 from gaident.diagnosis.explain.beside import friction_beside, late_together
+from gaident.diagnosis.explain.beyond import beyond_windows
 from gaident.diagnosis.explain.determined import determined, not_determined
 from gaident.diagnosis.explain.ends import ends_of
-from gaident.diagnosis.explain.held_out import standing
+from gaident.diagnosis.explain.held_out import shown_by_free_run, standing
 from gaident.diagnosis.explain.late_inside import late_inside
 from gaident.diagnosis.explain.late_sensor import by_the_angle, excluded_by_the_angle
 from gaident.diagnosis.explain.not_there import bounds_of
@@ -35,8 +36,6 @@ from gaident.diagnosis.explain.wording import (
     closer_numbers,
     closest,
     evidence_of,
-    far_off,
-    hidden_by_torque_noise,
     like_filters,
     of_the_mechanics,
     or_other_form,
@@ -49,13 +48,14 @@ from gaident.diagnosis.gains import Gains, measured_gains, with_effects
 from gaident.diagnosis.judged import Judged
 from gaident.diagnosis.library.record import findings_of_the_record
 from gaident.diagnosis.library.sides import called_of, name_of
-from gaident.diagnosis.library.terms import LIBRARY, in_controller
+from gaident.diagnosis.library.terms import LIBRARY
 from gaident.diagnosis.linear_part import linear_of_part
 from gaident.diagnosis.mechanics import base_shift, mechanics_of, moved, of_no_axis, of_the_age
 from gaident.diagnosis.note import Note
 from gaident.diagnosis.records.folded import ADVICE, folded
 from gaident.diagnosis.records.hygiene import cleaned, left_unexplained, quantisation
 from gaident.diagnosis.records.sizes import scales_of
+from gaident.diagnosis.records.windows import searched_in
 from gaident.diagnosis.selection import attribution
 from gaident.diagnosis.selection.offset import Offset, offset_of
 from gaident.diagnosis.selection.rivals import Replacement
@@ -64,9 +64,8 @@ from gaident.diagnosis.selection.sensor_age import searched
 from gaident.diagnosis.unlogged.other_gains import OTHER_GAINS, OtherGains, gain_doubt, under_given
 from gaident.diagnosis.unlogged.unlogged_form import UnloggedForm, in_series, leaves_noise, unlogged_form
 from gaident.estimation.dataset import DataSet
-from gaident.estimation.found_numbers import covariance_of_numbers
+from gaident.estimation.found_numbers import covariance_of_numbers, whole_of
 from gaident.estimation.objective import Fit, Objective
-from gaident.estimation.term import Term
 from gaident.estimation.uncertainty import estimates_of, model_covariance
 from gaident.identification.notes import open_loop_notes
 from gaident.models.model import Model
@@ -114,26 +113,30 @@ class Work:
         self.controller_steps, self.at_controller, notes = controller_findings(data, self.scales, not self.driving.simulated)
         self.notes += notes
         self.controller_steps += (*self.driving.logged.findings, *self.driving.findings)
-        # Limits that the log shows are part of every loop that is simulated in a fit.
-        limits = self.at_controller.effects
-        known: dict[Term, NDArray[np.float64]] = {
-            t: np.array(list(limits[t.name].values())) for t in in_controller() if t.name in limits
-        }
-        shown = self.at_controller.controller or self.controller
-        missing = bool(known) and data.told_by_torque and shown is self.controller  # a limit that its simulated loop would lack
         closed = self.driving.simulated and not (data.slower and self.driving.in_doubt)
-        self.follows = self.at_controller.follows and not missing and closed
-        data = replace(data, controller=shown, loop_follows=self.follows, known_noise=self.noise, found=self.driving.found)
-        self.data = data if self.at_controller.controller is not None else data.with_effects(known)
+        data = replace(data, known_noise=self.noise, found=self.driving.found)
+        self.whole = under_shown(data, self.at_controller, closed)
+        self.follows = self.whole.loop_follows
         self.excited = excitation(
-            self.clean, self.data.loop, axis=self.axis, pitch=data.period if data.period_seen else self.pitch
+            self.clean, self.whole.loop, axis=self.axis, pitch=data.period if data.period_seen else self.pitch
         )
-        kept = [~np.isin(np.arange(n), h) for h, n in zip(hit, self.data.lengths, strict=True)]
-        self.objective = Objective(self.data, np.concatenate(kept).astype(np.float64))
+        self.kept = [~np.isin(np.arange(n), h) for h, n in zip(hit, self.whole.lengths, strict=True)]
+        self.objective = searched_in(self.whole, self.kept)
+        self.data = self.objective.data
         self.notes += torque_unlogged(self.data)
 
     def search(self) -> None:
-        """The selected model, its rivals, what is left."""
+        """The selected model, its rivals, what is left; of long records once more with the lines that the model misses."""
+        said = list(self.notes)
+        self._search()
+        missed = beyond_windows(self.objective, self.final, self.whole, self.kept).missed
+        again = searched_in(self.whole, self.kept, [p for p, _ in missed]) if missed else self.objective
+        if again.data.places != self.data.places:
+            self.note(0.03, "once more, with lines that the model misses")
+            self.notes, self.objective, self.data = said, again, again.data
+            self._search()
+
+    def _search(self) -> None:
         allowed, self.not_testable = candidates(self.records, self.clean, self.data, self.excited, self.at_controller)
         self.notes += [*[ADVICE] * any(folded(r) for r in self.records), *loop_notes(self.data)]
 
@@ -228,6 +231,7 @@ class Work:
         """The result of a search, and what it leaves."""
         self.found, self.base, self.rivals = found, found.base, found.rivals
         self.data, self.objective = found.space.data, found.space.objective
+        self.whole = whole_of(self.data, self.whole)
         self._set_final(found.final)
 
     def _set_final(self, final: Fit) -> None:
@@ -239,15 +243,9 @@ class Work:
         """The effects that stand, and their gains. Where none stands, those of the search by whitened errors are judged."""
         while True:
             said = list(self.notes)
-            gains, driver = self._accepted_gains(), self.left.driver if self.adequate else self.left.strongest
-            adds_up = self.data.slower and not self.data.fits_in_loop  # what the torque lacks between the lines of the log
-            beyond = gains.after.rmse / floor if (floor := gains.floor) > 0.0 else 0.0
-            if driver is None and not adds_up and beyond > POLICY.free_run_ratio:
-                # A noise filter removes a slow misfit completely; the free run shows it.
-                driver = self.left.strongest or "time"
-                self.notes.append(far_off(beyond))
-            if driver is None and self.data.torque_measured and not gains.closed:
-                self.notes.append(hidden_by_torque_noise(floor))
+            gains = self._accepted_gains()
+            driver, shown = shown_by_free_run(self.data, gains, self.left, self.adequate)
+            self.notes += shown
             causes = [e for e in self.final.effects if not self._only_describes(e, driver)]
             estimates = estimates_of(self.under, self.estimate)
             if unknown := [e for e in causes if not determined(estimates[e])]:
@@ -277,8 +275,9 @@ class Work:
         """Everything the user sees."""
         self.note(0.9, "measuring the gain")
         gains, driver, causes, estimates, offset, mechanics, model, check = self.judged()
-        of_log, error = list(map(self.driving.outliers_in, self.records)), self.objective.error(self.final) - self.data.velocity
-        spoiled = left_unexplained(self.records, of_log, error, self.objective.weight)
+        beyond = beyond_windows(self.objective, self.final, self.whole, self.kept)
+        of_log = list(map(self.driving.outliers_in, self.records))
+        spoiled = left_unexplained(self.records, of_log, self.clean, beyond.error, self.kept)
         findings = findings_of_the_record(spoiled, sum(len(r) for r in self.records), self.step)
         findings += [replace(f, gain=gains.of(f.effect)) for f in self.controller_steps]
         estimates, together = late_together(self.under, self.estimate, self.found.space.allowed, estimates)
@@ -299,9 +298,9 @@ class Work:
             driver = driver or ("velocity" if impossible == "viscous_friction" else "past")
         real = [f for f in findings if not f.is_noise]
         answered = {*self.not_testable, *(name for f in findings for name in (f.effect, *f.alternatives))}
-        self.notes += (*together, *notes, *self.doubts, *load_words(self.found))
-        left, in_doubt = driver is not None or not explains_load(self.found), bool(self.doubts)
-        verdict = verdict_of(bool(real), left, in_doubt or (self.data.slower and self.driving.in_doubt))
+        self.notes += (*together, *notes, *self.doubts, *load_words(self.found), *beyond.words)
+        left = driver is not None or not explains_load(self.found) or bool(beyond.missed)
+        verdict = verdict_of(bool(real), left, bool(self.doubts) or (self.data.slower and self.driving.in_doubt))
         if driver is not None and (dropped := [e for e in self.final.effects if e not in causes]):
             shown = driver if self.left.gains[driver] > self.left.needed else None
             self.notes.append(closest(dropped, shown, bool(real)))
@@ -314,7 +313,7 @@ class Work:
             from gaident.diagnosis.experiments.next_experiment import propose
 
             other = self.objective.count, self.at_controller.effects
-            proposal, notes = propose(ambiguous, self.rivals, self.final, self.data, *other)
+            proposal, notes = propose(ambiguous, self.rivals, self.final, self.whole, *other)
             self.notes += notes
         extended = bool(self.final.effects or self.at_controller.effects or self.data.slower)
         return Diagnosis(
@@ -341,14 +340,14 @@ class Work:
             comparisons=check.comparisons,
             relevance=relevance_of(check.after, gains.floor, driver, self.left, self.under, self.estimate, mechanics),
             force_reason=check.reason,
-            not_there=bounds_of(self.found.space, self.final, answered) if driver is None else {},
+            not_there=bounds_of(self.found.space, self.final, answered) if driver is None and not beyond.missed else {},
             notes=tuple(self.notes),
             identification=self.idn,
             controller=self.controller,
             seed=seed,
             seconds=0.0,
             simulations=self.objective.counter.simulations,
-            samples=sum(self.data.lengths),
+            samples=sum(map(len, self.records)),
             digests=tuple(r.digest for r in self.records),
             validation_digests=tuple(r.digest for r in self.validation),
             torque_logged=self.data.torque_logged,
@@ -386,7 +385,7 @@ class Work:
         shown = attribution.shown_by_the_records(self.found.space, self.final, effect)
         follows = not (self.data.slower and (self.driving.in_doubt or self.doubts))
         names = alternatives_of(effect, rivals, sorted(self._equivalent_here(effect)), bool(shown), offset, follows, never)
-        names += integrator_start(effect, self.data) + [OTHER_GAINS] * (effect in self.gain_doubt.rivals)
+        names += integrator_start(effect, self.whole) + [OTHER_GAINS] * (effect in self.gain_doubt.rivals)
         names += [LOG_SHIFT] * (LIBRARY[effect].in_series and not LIBRARY[effect].resonates and self.driving.moved.may_be_early)
         if self.form is not None and self.form.as_good(self.found.space.margin) and effect in in_series(self.final):
             names.append(self.form.finding.effect)

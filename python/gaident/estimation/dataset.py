@@ -23,8 +23,11 @@ from gaident.control.found import FoundNumbers
 from gaident.control.pi import PI, bare_pi
 from gaident.data.record import Record
 from gaident.data.torque_kind import MEASURED
+from gaident.data.windows.window import began
 from gaident.estimation.mean_velocity import halved, means, with_middles
 from gaident.estimation.period import period_of_place
+from gaident.estimation.records.driven import angle_of, driven_under, freed, replayed, torque_in
+from gaident.estimation.records.places import Place, cut
 from gaident.estimation.term import Term, limiting_of
 from gaident.models.drive_torque import as_late, torque_of
 from gaident.models.made_torque import load_before, stored_torque
@@ -59,6 +62,7 @@ class DataSet:
     other_ages: ages that are possible too; a model that does not exclude them is less certain by what they change.
     found: numbers of the controller that the records show; their uncertainty is part of every deviation.
     clocked: whether the sample time of the controller was given.
+    places: of windows, where they lie in the records of `whole`; empty where the records are whole.
     """
 
     records: tuple[Record, ...]
@@ -82,6 +86,8 @@ class DataSet:
     other_ages: tuple[float, ...] = ()
     found: FoundNumbers | None = None
     clocked: bool = False
+    places: tuple[Place, ...] = ()
+    whole: DataSet | None = None
 
     @classmethod
     def of(
@@ -95,7 +101,7 @@ class DataSet:
         pitch: float | None = None,
     ) -> DataSet:
         """The records as driven by their torque; spoiled: some velocities are not what the controller read."""
-        driven = tuple(_driven(r, torque_of(r, bare_pi(controller))) for r in records)
+        driven = tuple(driven_under(r, torque_of(r, bare_pi(controller))) for r in records)
         turned = tuple(r.with_channels(position=angle_of(a)) for r, a in zip(records, driven, strict=True))
         free = freed(records, driven)
         moving = tuple(starts_moving(r, None) for r in driven)
@@ -107,7 +113,7 @@ class DataSet:
     def under(self, controller: Controller) -> DataSet:
         """The same records, whose torque is not logged, under another controller."""
         pi = bare_pi(controller)
-        driven = tuple(_driven(r, controller.torque_of(r) if pi is None else torque_of(r, pi)) for r in self.records)
+        driven = tuple(driven_under(r, controller.torque_of(r) if pi is None else torque_of(r, pi)) for r in self.records)
         return replace(self, controller=controller, driven=driven, free=freed(self.records, driven), found=None)
 
     def with_its_period(self) -> DataSet:
@@ -219,6 +225,8 @@ class DataSet:
     def stored(self) -> tuple[float, ...]:
         """What the integrator stored before each of the records, for a load [N m]."""
         loop = self.controller
+        if self.whole is not None:
+            return tuple(0.0 if p.start else self.whole.stored[p.at] for p in self.places)
         return tuple(0.0 if loop is None else stored_torque(r, loop) for r in self.records)
 
     @cached_property
@@ -289,11 +297,23 @@ class DataSet:
     @cached_property
     def _loads(self) -> tuple[float, ...]:
         """What the integrator stored before each record for a load [N m]."""
+        if self.whole is not None:
+            return tuple(0.0 if p.start else self.whole._loads[p.at] for p in self.places)
         return tuple(load_before(r, self.controller) for r in self.records)
 
     @cached_property
     def _loaded(self) -> dict[tuple[str, Controller | None], tuple[LoadedRecord, ...]]:
         return {}
+
+    @cached_property
+    def begun(self) -> tuple[float, ...]:
+        """Velocity at the first line of each window [rad/s], from which its start state is sought; empty without windows."""
+        return tuple(float(r.velocity[0]) for r in self.records) if self.whole is not None else ()
+
+    @property
+    def windowed(self) -> bool:
+        """Whether some records are windows that begin in the middle of one."""
+        return any(p.start for p in self.places)
 
     @cached_property
     def lengths(self) -> tuple[int, ...]:
@@ -318,12 +338,17 @@ class DataSet:
     @cached_property
     def travel(self) -> float:
         """The largest travel of a record [rad]."""
-        return max(float(np.ptp(angle_of(r))) for r in self.driven)
+        return max(float(np.ptp(angle_of(r))) for r in (self.whole or self).driven)
+
+    @cached_property
+    def duration(self) -> float:
+        """Duration of the longest record [s]."""
+        return max(r.duration for r in (self.whole or self).records)
 
     @cached_property
     def time(self) -> Vector:
         """Time since each record's start, records one after the other [s]."""
-        return np.concatenate([r.time for r in self.records])
+        return np.concatenate([began(r) + r.time for r in self.records])
 
     @cached_property
     def command(self) -> Vector | None:
@@ -350,8 +375,10 @@ class DataSet:
 
     def replayed(self, effects: Mapping[Term, Vector]) -> tuple[Record, ...]:
         """The records as driven by the torque that the controller makes with effects of its own, each with its parameters."""
+        if self.whole is not None:
+            return cut(self.whole.replayed(effects), self.whole.turned, self.places)
         rows = zip(self.records, self.read, self.stored, strict=True)
-        return tuple(_driven(r, replayed(read, self.controller, effects, stored)) for r, read, stored in rows)
+        return tuple(driven_under(r, replayed(read, self.controller, effects, stored)) for r, read, stored in rows)
 
     def replayed_error(self, effects: Mapping[Term, Vector]) -> Vector:
         """Logged torque minus the controller's replay with these effects, records one after the other [N m]."""
@@ -368,33 +395,3 @@ class DataSet:
         records, turned = (tuple(followed(r, also.slope) for r in part) for part in (self.records, self.turned))
         limited = self.pi.with_limits(torque, min(also.integrator, self.pi.limits[1]))
         return replace(self, records=records, turned=turned, controller=limited)
-
-
-def replayed(rec: Record, controller: Controller | None, effects: Mapping[Term, Vector], stored: float) -> Vector:
-    """What the controller makes of command and measured velocity, with effects of its own [N m]; stored: before the record."""
-    assert controller is not None and controller.replayable(rec)
-    return controller.torque_of(rec, limiting_of(effects) if effects else None, stored)
-
-
-def freed(records: Sequence[Record], driven: Sequence[Record]) -> tuple[Record, ...]:
-    """Torque-driven records without an angle that was not measured."""
-    return tuple(a if r.position is not None else a.with_channels(position=None) for r, a in zip(records, driven, strict=True))
-
-
-def _driven(rec: Record, torque: Vector) -> Record:
-    angle, w = rec.position, rec.velocity
-    if angle is None:
-        angle = np.concatenate([[0.0], np.cumsum(0.5 * rec.dt * (w[1:] + w[:-1]))])
-    return rec.with_channels(command=None, torque=torque, position=angle)
-
-
-def torque_in(rec: Record) -> Vector:
-    """The torque of a record that has one [N m]."""
-    assert rec.torque is not None
-    return rec.torque
-
-
-def angle_of(rec: Record) -> Vector:
-    """The angle of a record that has one [rad]."""
-    assert rec.position is not None
-    return rec.position

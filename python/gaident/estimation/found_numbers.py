@@ -32,10 +32,11 @@ from gaident.control.pi import bare_pi
 from gaident.data.record import Record
 from gaident.estimation import least_squares as ls
 from gaident.estimation.criterion import cost_of, effective_samples, gained
-from gaident.estimation.dataset import DataSet, freed, torque_in
+from gaident.estimation.dataset import DataSet
 from gaident.estimation.noise_model import NoiseFilter
 from gaident.estimation.objective import LOST, Fit, Hypothesis, Innovations, Objective
 from gaident.estimation.projection import WORST, inverse_of, project_out
+from gaident.estimation.records.driven import freed, torque_in
 from gaident.models.drive_torque import driven_by, torque_of
 from gaident.policy.table import POLICY
 
@@ -52,6 +53,7 @@ __all__ = [
     "slopes",
     "under_other",
     "variance_of",
+    "whole_of",
     "worth",
 ]
 
@@ -77,6 +79,15 @@ def under_other(data: DataSet, here: Controller, there: Controller, found: Found
     own = zip(data.controller.limits, here.limits, there.limits, strict=True)
     limits = (new if shown == old and np.isfinite(new) else shown for shown, old, new in own)  # those of the records stay
     return replace(data, controller=there.with_limits(*limits), driven=driven, free=freed(data.records, driven), found=found)
+
+
+def whole_of(data: DataSet, before: DataSet) -> DataSet:
+    """The whole records of a search's data, under its controller with its numbers; before: the same, under earlier ones."""
+    if not data.places:
+        return data
+    if data.controller is None or before.controller is None or data.controller == before.controller:
+        return before
+    return under_other(before, before.controller, data.controller, data.found)
 
 
 _MADE: MutableMapping[Record, dict[Controller, Vector]] = WeakKeyDictionary()

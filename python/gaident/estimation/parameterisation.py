@@ -73,6 +73,7 @@ class Parameterisation:
     """What the entries of x mean.
 
     masses: 1 or 2. units: size of a, c or e1, ...; starts: start states of each record (0: it starts at rest).
+    begun: velocity [rad/s] from which the first of these states counts, of each window of a record; empty: 0 of all.
     """
 
     masses: int
@@ -80,9 +81,10 @@ class Parameterisation:
     terms: tuple[Term, ...]
     starts: tuple[int, ...]
     scales: Scales
+    begun: tuple[float, ...] = ()
 
     @classmethod
-    def of(cls, model: Model, scales: Scales, moving: Sequence[bool]) -> Parameterisation:
+    def of(cls, model: Model, scales: Scales, moving: Sequence[bool], begun: Sequence[float] = ()) -> Parameterisation:
         """That of a linear model of one mass, one mass on a spring, or two (effects are added by `extended`).
 
         Its scales are the given ones with the values of the model's mechanism.
@@ -97,7 +99,7 @@ class Parameterisation:
             units += [w, w * w]
         masses = 2 if len(values) > 3 else 1  # no decision: how many numbers a mechanism has
         starts = tuple(model.order if m else 0 for m in moving)
-        return cls(masses, tuple(float(u) for u in units), (), starts, described(scales, model))
+        return cls(masses, tuple(float(u) for u in units), (), starts, described(scales, model), tuple(begun))
 
     @property
     def on_a_spring(self) -> bool:
@@ -202,13 +204,16 @@ class Parameterisation:
         """Rows of an effect's parameters, in the order of the effects table."""
         return self.term(effect).natural(X[:, self.slot(effect)])
 
-    def values(self, X: Matrix, left_out: Sequence[str] = ()) -> tuple[tuple[str, ...], Matrix]:
-        """(effects in the order of the table, by the core's names, rows of base parameters and theirs) for `simulate_values`."""
+    def values(self, X: Matrix, left_out: Sequence[str] = (), began: float = 0.0) -> tuple[tuple[str, ...], Matrix]:
+        """(effects in the order of the table, by the core's names, rows of base parameters and theirs) for `simulate_values`.
+
+        began: when a window of a record begins [s], from which the core counts the time.
+        """
         shown = [t for t in self._ordered if t.name not in left_out]
         if not shown and not self.on_a_spring:
             return (), self.base_values(X)
         zero = [np.zeros((len(X), 1))] if self.on_a_spring else []
-        parts = [self.base_values(X), *zero, *(_of_core(t, t.natural(X[:, self.slot(t.name)])) for t in shown)]
+        parts = [self.base_values(X), *zero, *(_of_core(t, _from(t, t.natural(X[:, self.slot(t.name)]), began)) for t in shown)]
         return tuple(t.name if t.waves == 1 else core_key(t.name) for t in shown), np.concatenate(parts, axis=1)
 
     def start_values(self, X: Matrix, record: int) -> Matrix | None:
@@ -218,6 +223,8 @@ class Parameterisation:
             return None
         first = self.size - sum(self.starts) + sum(self.starts[:record])
         own = X[:, first : first + n]
+        if self.begun:
+            own = own + self.begun[record] * np.eye(n)[0]
         for t in self.terms:
             if t.poles is None:
                 continue
@@ -281,6 +288,11 @@ class Parameterisation:
             rows += t.steps(self.scales)
         rows += [0.05 * self.scales.speed] * sum(self.starts)
         return _frozen(np.array(rows))
+
+
+def _from(term: Term, rows: Matrix, began: float) -> Matrix:
+    """Rows of parameters of an effect, as they are from another time on [s]."""
+    return rows if began == 0.0 or term.later is None else term.later(rows, began)
 
 
 def _of_core(term: Term, rows: Matrix) -> Matrix:

@@ -28,8 +28,10 @@ from gaident.control.filtering import filtered
 from gaident.control.pi import PI
 from gaident.data.record import Record
 from gaident.data.torque_kind import MEASURED
-from gaident.estimation.dataset import DataSet, angle_of, freed
+from gaident.data.windows.window import began
+from gaident.estimation.dataset import DataSet
 from gaident.estimation.parameterisation import Parameterisation
+from gaident.estimation.records.driven import angle_of, freed
 from gaident.estimation.term import Term
 from gaident.models.effects import place_of
 from gaident.models.model import Model
@@ -51,6 +53,7 @@ __all__ = [
 
 Vector = NDArray[np.float64]
 Matrix = NDArray[np.float64]
+ALL = slice(None)
 
 
 class Predictor(Protocol):
@@ -109,8 +112,7 @@ class OpenLoop:
         """Rows of x under the torques of these records; left_out: effects that the torques contain already."""
         if not self.own_angle and _bends_the_angle(self.data, parameters):
             return np.vstack([_of_true_angle(self, parameters, x, records, None, left_out) for x in X])
-        names, values = parameters.values(X, left_out)
-        return _simulated(self, parameters, X, names, values, records)
+        return _simulated(self, parameters, X, left_out, records)
 
     def _replayed(self, parameters: Parameterisation, X: Matrix, inside: Sequence[Term]) -> Matrix:
         """With effects of the controller the torque itself depends on x: rows that share it are simulated together."""
@@ -227,20 +229,30 @@ def _simulated(
     predictor: OpenLoop,
     parameters: Parameterisation,
     X: Matrix,
-    names: tuple[str, ...],
-    values: Matrix,
+    left_out: Sequence[str],
     records: Sequence[Record],
 ) -> Matrix:
-    """Rows of x under the torques of the records, as the sensor shows the velocity."""
+    """Rows of x under the torques of the records, as the sensor shows the velocity.
+
+    Of windows, rows that differ in the start of another one only are simulated once.
+    """
     data, shown = predictor.data, predictor.shown
     steps = data.steps_of(substeps(data, parameters.terms, None))
-    parts = [
-        r.velocities(
-            parameters.structure, names, values, initial_states=parameters.start_values(X, i), substeps=steps, shown=shown
-        )
-        for i, r in enumerate(data.loaded(records, None))
-    ]
-    return _side_by_side([_seen(predictor, part) for part in parts])
+    parts = []
+    for i, r in enumerate(data.loaded(records, None)):
+        names, values = parameters.values(X, left_out, began(r.rec))
+        states = parameters.start_values(X, i)
+        own = values if states is None else np.hstack([values, states])
+        few, back = _different(own) if data.windowed else (ALL, ALL)
+        known: dict[str, Any] = dict(initial_states=None if states is None else states[few], substeps=steps, shown=shown)
+        parts.append(_seen(predictor, r.velocities(parameters.structure, names, values[few], **known))[back])
+    return _side_by_side(parts)
+
+
+def _different(rows: Matrix) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """(numbers of the rows that differ from each other, place of each row among these)."""
+    _, first, back = np.unique(rows, axis=0, return_index=True, return_inverse=True)
+    return first, back.ravel()
 
 
 def _seen(predictor: OpenLoop | ClosedLoop, rows: Matrix) -> Matrix:
@@ -273,7 +285,6 @@ def _of_true_angle(
 ) -> Matrix:
     """One x with the true angle, from which the sensor of this model makes the angle that was seen."""
     data = predictor.data
-    names, values = parameters.values(x[None, :], left_out)
     # Back through the sensor: what stands last in the chain is taken back first.
     bending = sorted((t for t in parameters.terms if t.seen_angle), key=lambda t: -place_of(t.name))
     bent = [(t.seen_angle, parameters.effect_values(x[None, :], t.name)[0]) for t in bending]
@@ -290,6 +301,7 @@ def _of_true_angle(
             run, states = loaded.turned(data.ready_angle(angle, i)), parameters.start_values(x[None, :], i)
             taken = data.steps_of(steps)
         known: dict[str, Any] = dict(initial_states=states, substeps=taken, shown=predictor.shown)
+        names, values = parameters.values(x[None, :], left_out, began(loaded.rec))
         seen = run.velocities(parameters.structure, names, values, **known)
         parts.append(seen if controller is not None else _seen(predictor, seen))
     return np.concatenate(parts, axis=1)

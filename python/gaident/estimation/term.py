@@ -101,6 +101,9 @@ class Term:
     smooth: bool = True  # what it makes of a small change is small; a function of the user's may round, or jump at a threshold
     late: bool = False  # it makes the measured velocity late, which a logged angle shows
     resonates: bool = False  # a pair of poles and zeros in series with the mechanism, equivalent to a second mass
+    later: Callable[[Matrix, float], Matrix] | None = (
+        None  # of the time: natural parameters in a record that begins so much later
+    )
     poles: Callable[[Vector], tuple[complex, ...]] | None = None  # poles in series [rad/s] of natural parameters
     seen_angle: Callable[[Vector, Vector, Vector], Vector] | None = None  # (seen angle, velocity, parameters) -> true angle
     limiting: Callable[[Vector], Limiting] | None = None  # what an effect in the controller limits there

@@ -21,7 +21,7 @@ On one gap under a coloured torque, whose impacts no model predicts, the error w
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from itertools import pairwise
 
@@ -34,6 +34,7 @@ from gaident.estimation.least_squares import fit as fitted
 from gaident.estimation.objective import LOST, Fit, Objective
 from gaident.estimation.parameterisation import parameter_names
 from gaident.estimation.projection import inverse_of
+from gaident.estimation.records.places import Place
 from gaident.estimation.regression.regression import larger_of, long_run
 from gaident.models.effect_rows import by_wave, wave_of
 from gaident.models.effects import row_of
@@ -107,10 +108,12 @@ def _of_the_angle(objective: Objective, fit: Fit) -> Matrix:
         var of the angle's mean over n samples = (s dt)^2 n/3,   phase: moves by the order times it
 
     s: standard deviation of white noise on the velocity. The difference of an encoder's angle does not walk away from it.
+    The angle of a window is the integral from its record's beginning on, see `_walk_over`.
     """
     part, data = np.zeros((len(fit.x), len(fit.x))), fit.predictor.data
     turning = [t for t in fit.parameters.terms if t.harmonic and "phase" in parameter_names(t)]
-    if not turning or data.angle_logged or data.differenced or fit.predictor.own_angle:
+    own = fit.predictor.own_angle and not data.places  # that of a simulation begins at the walked one in each window
+    if not turning or data.angle_logged or data.differenced or own:
         return part
     move = np.zeros(len(fit.x))
     for term in turning:
@@ -123,10 +126,24 @@ def _of_the_angle(objective: Objective, fit: Fit) -> Matrix:
         move[slot] = np.repeat(orders, term.size // term.waves) * np.asarray(turned) / h
     lengths = np.array(objective.lengths, dtype=np.float64)
     noise = data.noise_of(objective.error(fit)) * data.dt
-    variance = (
-        noise**2 * float(np.sum((lengths / lengths.sum()) ** 2 * lengths)) / 3.0
-    )  # no decision: a formula: of a random walk
-    return variance * np.outer(move, move)
+    # no decision: a formula: of a random walk
+    walk = _walk_over(data.places) if data.places else float(np.sum((lengths / lengths.sum()) ** 2 * lengths)) / 3.0
+    return noise**2 * walk * np.outer(move, move)
+
+
+def _walk_over(places: Sequence[Place]) -> float:
+    """Variance of the mean over windows of a random walk, which begins with each record and has steps of variance 1.
+
+        n^2 var = sum over lines j, k of one record of min(j, k)
+
+    n: lines of all windows. Of two windows that is each line of the earlier one, once for each line of the later one.
+    """
+    total = 0.0
+    for i, p in enumerate(sorted(places)):
+        n = p.stop - p.start
+        total += n**2 * p.start + n**3 / 3.0  # no decision: a formula: the double sum within a window
+        total += sum(n * (q.stop - q.start) * (p.start + p.stop) for q in sorted(places)[i + 1 :] if q.at == p.at)
+    return total / float(sum(p.stop - p.start for p in places)) ** 2
 
 
 def _jackknife(objective: Objective, fit: Fit) -> Vector:

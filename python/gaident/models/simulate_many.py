@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -12,6 +13,7 @@ from numpy.typing import ArrayLike
 from gaident import _core
 from gaident.control.controller import Controller
 from gaident.data.record import Record
+from gaident.data.windows.window import began
 from gaident.errors import GaidentError, ModelError
 from gaident.models.discrete import require_strictly_proper
 from gaident.models.effect_rows import effect_and_side, key_of
@@ -176,6 +178,8 @@ class LoadedRecord:
         table = np.ascontiguousarray(values, dtype=np.float64)
         starts = np.zeros((0, 0)) if initial_states is None else np.ascontiguousarray(initial_states, dtype=np.float64)
         built_in, own = _parted(structure, effects, table)
+        if start := began(self.rec):
+            own = [(acts, partial(_asked_later, ask, start), rows) for acts, ask, rows in own]
         names = [e for e in effects if not _is_own(e)]
         asked = tuple(structure), names, starts, checked_substeps(substeps), workers, own
         try:
@@ -213,6 +217,12 @@ def simulated_with_effects(
                 whole[index] = part
     assert found is not None
     return tuple(found)
+
+
+def _asked_later(ask: Callable[..., Any], began: float, *given: Any) -> Any:
+    """A user-defined effect in a window, at the time of the record; given: velocity, angle, torque, command, time, values."""
+    velocity, angle, torque, command, time, *values = given
+    return ask(velocity, angle, torque, command, time + began, *values)
 
 
 def _is_own(key: str) -> bool:

@@ -14,6 +14,7 @@ from gaident.control.controller import Controller, checked_controller
 from gaident.control.filtering import rate_limited
 from gaident.data.record import Record
 from gaident.data.signals.arrays import floats
+from gaident.data.windows.window import Window, angle_before
 from gaident.errors import ModelError, RecordError
 from gaident.models.discrete import require_strictly_proper
 from gaident.models.held_torque import held_torque
@@ -129,6 +130,8 @@ def core_record(
     angle = rec.position if angle is None else angle
     if angle is not None:
         start = float(angle[0])
+    elif isinstance(rec, Window):
+        start = angle_before(rec)
     between = None if controller is None else controller.source_of(rec)
     source = source if between is None else between
     return core.effect_record(rec.dt, source, angle, rec.velocity, start, controller, before)

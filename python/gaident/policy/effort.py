@@ -110,6 +110,12 @@ class Effort:
     most_samples: int = effort(
         1 << 16, "samples", "in which a model is searched at most, a law of the torque fitted, or what was not found bounded"
     )
+    whole_samples: int = effort(
+        200_000, "samples", "of records together, of all of which a diagnosis searches a model: 1.5 minutes and 3 GB"
+    )
+    diagnosed_samples: int = effort(1 << 15, "samples", "of longer records, in windows of which a diagnosis searches a model")
+    windows: int = effort(5, "windows", "of long records about, each of which has a start state of its own that is fitted")
+    missed_lines: int = effort(1024, "lines", "of a piece, whose errors are compared with those of the windows")
     aligned_samples: int = effort(1 << 15, "samples", "of two logs, by which their offset is looked for at first")
     lag_samples: int = effort(1 << 17, "samples", "of a record, from which the lag of its torque is estimated")
     replayed_samples: int = effort(1 << 18, "samples", "of a record, on which an identification replays the controller")

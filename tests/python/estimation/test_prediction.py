@@ -10,9 +10,10 @@ import pytest
 import gaident as ga
 from gaident.control.controller import Limiting
 from gaident.diagnosis.library.terms import LIBRARY
-from gaident.estimation.dataset import DataSet, torque_in
+from gaident.estimation.dataset import DataSet
 from gaident.estimation.parameterisation import Parameterisation
 from gaident.estimation.prediction import ClosedLoop, ObserverLoop, OpenLoop
+from gaident.estimation.records.driven import torque_in
 from gaident.estimation.term import Scales, Term
 from gaident.policy.table import POLICY
 

@@ -20,7 +20,8 @@ from gaident.data.record import Record
 from gaident.diagnosis.library.settings import ANTI_WINDUP, OF_SETTING
 from gaident.diagnosis.library.terms import in_controller
 from gaident.estimation.criterion import gained
-from gaident.estimation.dataset import DataSet, torque_in
+from gaident.estimation.dataset import DataSet
+from gaident.estimation.records.driven import torque_in
 from gaident.estimation.term import Scales, Term
 from gaident.identification.replay.causes import white_noise
 from gaident.identification.replay.replay import Replay, replay
@@ -29,7 +30,7 @@ from gaident.policy.table import POLICY
 from gaident.results.estimate import Estimate
 from gaident.results.finding import Finding
 
-__all__ = ["AsLogged", "AtController", "as_logged", "controller_findings"]
+__all__ = ["AsLogged", "AtController", "as_logged", "controller_findings", "under_shown"]
 
 Vector = NDArray[np.float64]
 
@@ -289,3 +290,15 @@ def _std(data: DataSet, term: Term, value: float, cost: float) -> float:
     slope = (high - low) / (2.0 * h)
     power = float(slope @ slope)
     return float(np.sqrt(cost / len(slope) / power)) if power > 0.0 else float("inf")
+
+
+def under_shown(data: DataSet, at: AtController, closed: bool) -> DataSet:
+    """The records under the controller with what the log shows of it; closed: whether a loop with it can be the drive's.
+
+    Limits that the log shows are part of every loop that is simulated in a fit.
+    """
+    known: dict[Term, Vector] = {t: np.array(list(at.effects[t.name].values())) for t in in_controller() if t.name in at.effects}
+    shown = at.controller or data.controller
+    missing = bool(known) and data.told_by_torque and shown is data.controller  # a limit that its simulated loop would lack
+    found = replace(data, controller=shown, loop_follows=at.follows and not missing and closed)
+    return found if at.controller is not None else found.with_effects(known)

@@ -29,13 +29,16 @@ from collections.abc import Callable, Collection, Sequence
 
 from gaident.axis import Text, called, joined, say
 from gaident.diagnosis.check import Check
+from gaident.diagnosis.explain.wording import far_off, hidden_by_torque_noise
 from gaident.diagnosis.gains import Gains
 from gaident.diagnosis.library.sides import called_of, name_of
 from gaident.diagnosis.library.terms import LIBRARY, of_inverse_dynamics
+from gaident.diagnosis.selection.dependence import Dependence
+from gaident.estimation.dataset import DataSet
 from gaident.policy.table import POLICY
 from gaident.results.estimate import Estimate
 
-__all__ = ["standing"]
+__all__ = ["shown_by_free_run", "standing"]
 
 
 NOTHING_MOVES_IT = (
@@ -68,6 +71,22 @@ def standing(
         kept = _witnessed(causes, check, same)
         return kept, (_lost(worse, low > 0.0, check, kept),) if matters or len(kept) < len(causes) else ()
     return list(causes), (_by_the_torque(causes, check),) if worse else ()
+
+
+def shown_by_free_run(data: DataSet, gains: Gains, left: Dependence, adequate: bool) -> tuple[str | None, list[Text]]:
+    """(what drives what a model leaves, None where nothing counts; what is said of its free run).
+
+    A noise filter removes a slow misfit completely; the free run shows it.
+    """
+    driver, notes = left.driver if adequate else left.strongest, []
+    adds_up = data.slower and not data.fits_in_loop  # what the torque lacks between the lines of the log
+    beyond = gains.after.rmse / floor if (floor := gains.floor) > 0.0 else 0.0
+    if driver is None and not adds_up and beyond > POLICY.free_run_ratio:
+        driver = left.strongest or "time"
+        notes.append(far_off(beyond))
+    if driver is None and data.torque_measured and not gains.closed:
+        notes.append(hidden_by_torque_noise(floor))
+    return driver, notes
 
 
 def _force_falls(check: Check) -> bool:

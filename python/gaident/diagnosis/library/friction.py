@@ -22,6 +22,13 @@ FRICTION = "dry friction"
 """The family of dry friction and its generalisations: a model contains one of them."""
 
 
+def _drifted(rows: Matrix, seconds: float) -> Matrix:
+    """T (1 + rate (t + s)) = T' (1 + rate' t):   T' = T (1 + rate s),   rate' = rate/(1 + rate s)."""
+    level = 1.0 + rows[:, 1] * seconds
+    level = np.where(level == 0.0, 1e-12, level)  # no decision: no division by 0
+    return np.column_stack([rows[:, 0] * level, rows[:, 1] / level])
+
+
 def _stribeck(z: Matrix) -> Matrix:
     return np.column_stack([z[:, 0], z[:, 0] * (1.0 + z[:, 1]), np.exp(z[:, 2])])
 
@@ -213,6 +220,7 @@ CAUSES: tuple[Cause, ...] = (
         neutral=lambda level, s: (level, 0.0),
         levels=True,
         time_varying=True,
+        later=_drifted,
         domains=AT_THE_SHAFT,
         curve=_dry,
         needs=(t.moves, t.speeds_mixed_in_time),

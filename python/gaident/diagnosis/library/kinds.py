@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from gaident.axis import TURN
 from gaident.diagnosis.library.cause import Cause
 from gaident.diagnosis.library.coordinates import positive
 from gaident.estimation.term import PHASE, Rows, Scales
@@ -90,6 +91,7 @@ def tone(effect: str, **known: Any) -> Cause:
         lambda s: [],
         lambda s: (0.05 * s.torque, 0.05 * s.torque, 0.02 / s.duration),
         in_time=True,
+        later=lambda rows, s: rows + TURN * s * rows[:, 1:2] * np.eye(3)[2],  # the phase, in rad, of the frequency
         scales={"phase": PHASE},
         **known,
     )

@@ -117,14 +117,25 @@ def cleaned_signal(signal: Vector, hit: NDArray[np.intp]) -> Vector:
     return cleaned
 
 
-def left_unexplained(records: Sequence[Record], of_log: Sequence[NDArray[np.intp]], missing: Vector, weight: Vector) -> int:
+def left_unexplained(
+    records: Sequence[Record],
+    of_log: Sequence[NDArray[np.intp]],
+    clean: Sequence[Record],
+    error: Vector,
+    kept: Sequence[NDArray[np.bool_]],
+) -> int:
     """Number of outliers of the log, and of samples that the model found does not follow.
 
-    of_log: outliers of each record. missing: minus the velocity of the model (n,). weight (n,): 0 where samples were left out.
+    of_log: outliers of each record. error (n,): of the model on the clean records. kept: of each record, False where samples were
+    left out.
     """
+    count = sum(len(np.unique(own)) for own in of_log)
+    if all(np.all(lines) for lines in kept):
+        return count
     hit = np.concatenate([np.isin(np.arange(len(r)), own) for r, own in zip(records, of_log, strict=True)])
     measured = np.concatenate([r.velocity for r in records])
-    return int(hit.sum()) + unexplained(measured, missing + measured, np.maximum(weight, hit))
+    missing = error - np.concatenate([r.velocity for r in clean])
+    return count + unexplained(measured, missing + measured, np.maximum(np.concatenate(kept), hit).astype(np.float64))
 
 
 def unexplained(velocity: Vector, error: Vector, weight: Vector) -> int:

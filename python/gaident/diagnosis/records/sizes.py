@@ -22,7 +22,7 @@ def scales_of(data: DataSet) -> Scales:
     torque = max(float(np.abs(u).max()), 1e-300)
     return Scales(
         dt=dt,
-        duration=max(r.duration for r in data.records),
+        duration=data.duration,
         speed=max(float(np.abs(w).max()), 1e-300),
         torque=torque,
         acceleration=steps or float("inf"),

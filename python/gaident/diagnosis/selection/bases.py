@@ -79,7 +79,7 @@ class Task:
 
     def start(self, model: Model, iterations: int = POLICY.long) -> Fit:
         """A mechanism fitted to the raw errors of the records."""
-        parameters = Parameterisation.of(model, self.scales, self.data.moving)
+        parameters = Parameterisation.of(model, self.scales, self.data.moving, self.data.begun)
         return ls.fit(self.objective, Hypothesis(parameters, self.predictor()), parameters.start(model), WHITE, iterations)
 
     def one_mass(self) -> Fit:
@@ -140,7 +140,7 @@ def output_error_bases(task: Task, bases: Sequence[Fit]) -> list[Fit]:
     predictor: Predictor = ClosedLoop(task.data) if closed else OpenLoop(task.data)
     starts = [(f.parameters, f.x) for f in bases]
     for model in rigid(task.model) + reduced(task.model):
-        parameters = Parameterisation.of(model, task.scales, task.data.moving)
+        parameters = Parameterisation.of(model, task.scales, task.data.moving, task.data.begun)
         starts.append((parameters, parameters.start(model)))
     fits = [ls.fit(task.objective, Hypothesis(p, predictor), x, WHITE, POLICY.usual) for p, x in starts]
     fits.sort(key=lambda f: (not swings(f), f.cost))
@@ -215,12 +215,12 @@ class ByOutputErrors:
     def _fitted(self, axis: InverseDynamics, values: Mapping[str, float], predictor: Predictor) -> Fit:
         """The axis of these parameters of the regression, fitted by output errors."""
         task, data = self.task, self.task.data
-        slowest = 1.0 / max(r.duration for r in data.records)
+        slowest = 1.0 / data.duration
         inertia, damping, stiffness = values["inertia"], max(_corner(axis), slowest), values.get("spring", 0.0)
         rigid_axis = Model(1.0 / inertia, [-damping])
         if stiffness > 0.0:
             rigid_axis = Model(1.0 / inertia, quadratic_roots(damping, stiffness / inertia), [0.0])
-        parameters = Parameterisation.of(rigid_axis, task.scales, data.moving)
+        parameters = Parameterisation.of(rigid_axis, task.scales, data.moving, data.begun)
         x = parameters.base_vector(rigid_axis)
         for term, own in of_inverse_dynamics(values).items():
             if term in task.allowed:

@@ -39,7 +39,8 @@ def decimated(data: DataSet, blocks: int) -> DataSet:
     records = [decimated_record(data.as_old(r) if data.age else r, blocks) for r in data.driven]
     finest = max(FINEST, 2.0 * data.dt)  # no decision: of a solver: the step of a simulation
     found = replace(DataSet.of(records, None), finest=finest, known_noise=data.noise)
-    return replace(found, torque_measured=data.torque_measured, axis=data.axis, period=data.period)
+    found = replace(found, torque_measured=data.torque_measured, axis=data.axis, period=data.period)
+    return replace(found, moving=data.moving, places=data.places, whole=data.whole) if data.whole is not None else found
 
 
 def decimated_objective(objective: Objective, blocks: int) -> Objective:
@@ -80,7 +81,7 @@ def moved(data: DataSet, scales: Scales, fit: Fit) -> Fit:
     """The same model, effects in their order, as a start on another grid of time; start states are zero and nothing is fitted."""
     old = fit.parameters
     linear = old.linear(fit.x)
-    new = Parameterisation.of(linear, scales, data.moving)
+    new = Parameterisation.of(linear, scales, data.moving, data.begun)
     new = replace(new, scales=replace(new.scales, friction=old.scales.friction))
     x = new.base_vector(linear)
     for t in old.terms:

@@ -67,7 +67,7 @@ def balanced(data: DataSet) -> Model:
         gram += columns @ columns.T
         right += columns @ (r.velocity - r.velocity.mean())
     K, a = np.linalg.lstsq(gram, right, rcond=1e-12)[0]
-    slow = 1.0 / max(r.duration for r in data.records)
+    slow = 1.0 / data.duration
     return Model(abs(float(K)) or 1.0, [-max(float(a), slow)])
 
 
@@ -95,7 +95,7 @@ def balanced_on_a_spring(data: DataSet) -> Model | None:
 
 
 def _on_a_spring(K: float, a: float, c: float, data: DataSet) -> Model:
-    slow = 1.0 / max(r.duration for r in data.records)
+    slow = 1.0 / data.duration
     return Model(K, quadratic_roots(max(a, slow), c), [0.0])
 
 
@@ -225,7 +225,7 @@ def _two_masses(parameters: Parameterisation, x: Vector) -> Model:
 def moved_to(model: Model, fit: Fit, left_out: str = "") -> tuple[Hypothesis, Vector]:
     """The effects of a fit, but one, on another linear mechanism; start states at 0."""
     old = fit.parameters
-    new = Parameterisation.of(model, old.scales, [n > 0 for n in old.starts])
+    new = Parameterisation.of(model, old.scales, [n > 0 for n in old.starts], old.begun)
     x = new.base_vector(model)
     for t in old.terms:
         if t.name != left_out:

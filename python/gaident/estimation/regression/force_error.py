@@ -22,6 +22,7 @@ import math
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import pairwise
 from typing import Any, TypeGuard
 
 import numpy as np
@@ -31,6 +32,7 @@ from gaident.checks import LONGEST, is_whole, real_number
 from gaident.control.pi import PI
 from gaident.data.record import Record
 from gaident.data.torque_kind import MEAN, MEASURED
+from gaident.data.windows.window import integrated, window_of
 from gaident.errors import ModelError, RecordError, SettingsError
 from gaident.estimation.regression.motion import ORDER, Motion, cutoff_of, low_passed, motion_of, noise_share, torque_noise
 from gaident.estimation.regression.sensor_lag import angle_is_ahead
@@ -40,10 +42,12 @@ from gaident.models.simulate import run, simulate
 from gaident.policy.table import POLICY
 from gaident.results.inverse_dynamics import InverseDynamics
 
-__all__ = ["FilteredRecords", "ForceError", "band_of", "effects_before_the_shaft", "force_error"]
+__all__ = ["FilteredRecords", "ForceError", "band_of", "effects_before_the_shaft", "force_error", "in_pieces"]
 
 Vector = NDArray[np.float64]
 TorqueOf = Callable[[Record], Vector]
+
+LEAD = 8  # no decision: a formula: of a piece, the part before it in which a filter begins
 
 
 @dataclass(frozen=True)
@@ -167,11 +171,17 @@ class FilteredRecords:
     order: int = ORDER
     angles: tuple[Vector | None, ...] | None = None
 
+    @property
+    def motions(self) -> Iterable[Motion]:
+        """The filtered motion of each record; of long ones it is made anew when it is asked for."""
+        return self._motions if sum(map(len, self.records)) <= POLICY.whole_samples else self._made()
+
     @cached_property
-    def motions(self) -> tuple[Motion, ...]:
-        """The filtered motion of each record."""
-        given = self.angles or (None,) * len(self.records)
-        return tuple(map(self._motion, self.records, given))
+    def _motions(self) -> tuple[Motion, ...]:
+        return tuple(self._made())
+
+    def _made(self) -> Iterable[Motion]:
+        return map(self._motion, self.records, self.angles or (None,) * len(self.records))
 
     def _motion(self, rec: Record, angle: Vector | None) -> Motion:
         motion = motion_of(rec, self.cutoff_hz, self.order)
@@ -198,6 +208,20 @@ class FilteredRecords:
         floor = sum(len(e) * power for (e, _), power in zip(torques, powers, strict=True))
         rms, size, least = (float(np.sqrt(x / count)) for x in (left, whole, floor))
         return ForceError(rms if math.isfinite(rms) else math.inf, size, least, self.cutoff_hz, self.order, count)
+
+
+def in_pieces(rec: Record, first: int) -> list[tuple[Record, int]]:
+    """A long record from the sample `first` on, in pieces each with its own first sample; a shorter one as it is.
+
+    A force error knows no past: of a piece it lacks what the filter does to its ends.
+    """
+    if len(rec) <= POLICY.whole_samples:
+        return [(rec, first)]
+    length = POLICY.most_samples
+    angle = integrated(rec) if rec.position is None else rec.position
+    ends = np.linspace(first, len(rec), max((len(rec) - first) // length, 1) + 1).astype(int).tolist()
+    lead = length // LEAD
+    return [(window_of(rec, max(start - lead, 0), stop, angle), min(start, lead)) for start, stop in pairwise(ends)]
 
 
 def band_of(model: object, records: Sequence[Record], order: int = ORDER, below: float = POLICY.swing_band) -> float:

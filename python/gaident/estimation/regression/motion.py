@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 
 from gaident.control.filtering import zero_phase
 from gaident.data.record import Record
+from gaident.data.windows.window import integrated
 from gaident.models.held_torque import torque_at_lines
 from gaident.models.starts import noise_std
 from gaident.policy.table import POLICY
@@ -53,7 +54,7 @@ def motion_of(rec: Record, cutoff_hz: float, order: int, standstill: float | Non
         velocity = np.gradient(position, rec.dt)
     else:
         velocity = low_passed(rec.velocity, rec.dt, cutoff_hz, order)
-        position = np.concatenate([[0.0], np.cumsum(0.5 * rec.dt * (velocity[1:] + velocity[:-1]))])
+        position = integrated(rec, velocity)
     torque = None if rec.torque is None else low_passed(torque_at_lines(rec), rec.dt, cutoff_hz, order)
     spectrum = _spectrum(rec)
     # Standstill, and 1/cutoff before and after: the velocity is below its noise, or far below its own rms.

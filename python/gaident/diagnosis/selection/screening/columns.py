@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from gaident.axis import TURN
 from gaident.control.filtering import filtered
 from gaident.diagnosis.selection.mechanisms import swings_at
-from gaident.diagnosis.selection.screening.spectrum import lines
+from gaident.diagnosis.selection.screening.spectrum import in_phase, lines
 from gaident.estimation.dataset import DataSet
 from gaident.estimation.load_end import LoadEnd
 from gaident.estimation.objective import Hypothesis, Objective
@@ -88,9 +88,13 @@ def tone_columns(objective: Objective, hypothesis: Hypothesis, x: Vector, term: 
     """(frequencies [Hz], columns) of the highest peaks of the error's spectrum, as `harmonic_columns` has them for orders."""
     end = LoadEnd.of(hypothesis.parameters, x, objective.data) if term.at_load else None
     found, pairs = [], []
-    for radians, rows in lines(error, objective.data.lengths):
+    data, at = objective.data, objective.data.time / objective.data.dt
+    for radians, rows in lines(error, data.lengths):
         if radians < POLICY.seen_band * np.pi:
-            found.append(radians / (2.0 * np.pi * objective.data.dt))
+            if data.places:  # windows of a record have one phase
+                radians = in_phase(error, data.lengths, at, radians)
+                rows = np.array([np.cos(radians * at), np.sin(radians * at)])
+            found.append(radians / (2.0 * np.pi * data.dt))
             pairs += [rows[1::2].sum(axis=0), rows[0::2].sum(axis=0)]
     if not found:
         return np.zeros(0), np.zeros((0, len(error)))

@@ -7,10 +7,14 @@ from numpy.typing import NDArray
 
 from gaident.policy.table import POLICY
 
-__all__ = ["lines"]
+__all__ = ["in_phase", "lines"]
 
 Vector = NDArray[np.float64]
 Matrix = NDArray[np.float64]
+
+BLOCKS = 20  # no decision: a grid: of a window, whose sums are taken
+FINER = 4  # no decision: a grid: points for each half turn between the first window and the last
+GRID = 1024  # no decision: a block in memory
 
 
 def lines(error: Vector, lengths: tuple[int, ...]) -> list[tuple[float, Matrix]]:
@@ -41,6 +45,29 @@ def lines(error: Vector, lengths: tuple[int, ...]) -> list[tuple[float, Matrix]]
         found.append((f, rows))
         height[max(k - half, 0) : k + half + 1] = 0.0
     return found
+
+
+def in_phase(error: Vector, lengths: tuple[int, ...], at: Vector, radians: float) -> float:
+    """The frequency near this one [rad per sample] whose sine has one phase in windows of records; at (n,): line in the record.
+
+        the highest |sum over lines of error hanning(window) exp(-i radians at)|
+
+    A window of n lines tells a frequency by 2 pi/n; windows that lie N lines apart tell those in it that are 2 pi/N apart.
+    """
+    parts = [(e - e.mean()) * np.hanning(len(e)) for e in np.split(error, np.cumsum(lengths)[:-1])]
+    turning = np.concatenate(parts) * np.exp(-1j * radians * at)
+    width, span = 2.0 * np.pi / min(lengths), float(np.ptp(at)) + 1.0
+    # Within a block the phase turns by a twentieth of a turn at most.
+    block = max(min(lengths) // BLOCKS, 1)
+    first = np.concatenate([start + np.arange(0, n, block) for start, n in zip(np.cumsum((0, *lengths)), lengths, strict=False)])
+    sums, middle = np.add.reduceat(turning, first), at[first] + 0.5 * (block - 1)
+    count = int(np.ceil(width * span / np.pi * FINER))
+    best, beyond = 0.0, 0.0
+    for part in np.array_split(np.linspace(-width, width, 2 * count + 1), max(count // GRID, 1)):
+        heights = np.abs(np.exp(-1j * part[:, None] * middle) @ sums)
+        if (top := int(np.argmax(heights))) >= 0 and heights[top] > beyond:
+            best, beyond = float(part[top]), float(heights[top])
+    return radians + best
 
 
 def _peak(spectrum: Vector, k: int) -> float:

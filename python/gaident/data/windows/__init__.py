@@ -1,0 +1,1 @@
+"""Windows of long records, which know where they lie."""
