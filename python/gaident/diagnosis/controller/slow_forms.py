@@ -243,11 +243,7 @@ def _by_windup(records: Sequence[Record], given: Cascade, best: Cascade) -> floa
 def _time_std(records: Sequence[Record], best: Cascade) -> float:
     """Deviation of a tracking time [s]; 0 without one."""
     time = best.velocity.tracking_time
-
-    def tracked(at: float) -> Cascade:
-        return replace(best, velocity=replace(best.velocity, tracking_time=at))
-
-    return 0.0 if time is None else time_std(records, tracked, time)
+    return 0.0 if time is None else time_std(records, lambda at: _tracked(best, at), time)
 
 
 def time_std(records: Sequence[Record], with_time: Callable[[float], Cascade], time: float, late: int = 0) -> float:
@@ -284,7 +280,7 @@ def _closest(records: Sequence[Record], controller: Cascade, limit: float) -> Ca
     assert time is not None
 
     def with_time(logarithm: float) -> Cascade:
-        return replace(tracking, velocity=replace(tracking.velocity, tracking_time=float(np.exp(logarithm))))
+        return _tracked(tracking, float(np.exp(logarithm)))
 
     found = minimize_scalar(
         lambda x: run_error(records, with_time(x)),
