@@ -188,13 +188,14 @@ wheel: .venv/.tested .venv/.released ## this machine's wheel, installed and trie
 
 # The C++ tests of another system, NAME, by tests/cpp/NAME.cmake. Only the programs: what ctest has beside them calls a shell.
 # -O1: half the compile time of -O3, the same bits. One test comes first, alone: two at a time would both make the folder of Wine.
+# That folder is removed: it has a link to the whole file system, which the making of an sdist would follow.
 define cross_tested
 	@mkdir -p build/$(1)
 	$(CMAKE) -B build/$(1) --toolchain tests/cpp/$(1).cmake -DGAIDENT_BENCH=OFF -DGAIDENT_WERROR=OFF -DCMAKE_CXX_FLAGS_RELEASE=-O1 \
 		> build/$(1)/configure.log || { cat build/$(1)/configure.log; exit 1; }
 	$(BIN)/cmake --build build/$(1)
 	@WINEDEBUG=-all WINEPREFIX="$(abspath build/$(1)/wine)" $(BIN)/ctest --test-dir build/$(1) -I 1,1 > build/$(1)/first.log || true
-	WINEDEBUG=-all WINEPREFIX="$(abspath build/$(1)/wine)" $(CTEST) build/$(1) -R '^test_'
+	WINEDEBUG=-all WINEPREFIX="$(abspath build/$(1)/wine)" $(CTEST) build/$(1) -R '^test_'; ended=$$?; rm -rf build/$(1)/wine; exit $$ended
 endef
 
 windows: .venv/.tools ## the C++ tests as Windows programs under Wine, for which Debian has g++-mingw-w64-x86-64-posix and wine
